@@ -1,6 +1,6 @@
 """Random ordinary cuts against the true paths of the teeth: how many are within the stated error.
 
-    python benchmarks/truth.py [NUMBER] [--first SEED] [--kind KIND ...] [--chips NUMBER] [--walls NUMBER]
+    python benchmarks/truth.py [NUMBER] [--first SEED] [--kind KIND ...] [--results FILE] [--chips N] [--walls N]
 
 Each cut is a program that chipload.simulate runs at its default settings, with steps of 0.5 to 2 mm: a flat, ball,
 bull-nose, tapered or barrel mill of 3 to 20 mm, 2 to 6 teeth, a helix of 20 to 50 deg, a depth of 0.1 to 2 diameters (a
@@ -8,7 +8,8 @@ ball: to 0.4), a radial depth of 0.004 to 1 diameter, a feed per tooth of 0.2 to
 milling, runout of 0 to 15 µm, a fifth uneven pitch, and coefficients that vary by 30 %; or a flat mill on a helix into
 solid material. The oracles, ``tests/engagement/tooth_paths.py`` and ``helix_paths.py``, use no code of the package.
 ``--chips`` compares the chips of a number of flat and ball mills alone, without a simulation. ``--walls`` compares the
-greatest form error of a number of walls that helical flat mills finish, most of them in down milling.
+greatest form error of a number of walls that helical flat mills finish, most of them in down milling. ``--results``
+appends one line for each cut to a file, and runs no cut again that stands in it.
 
 Compared are the greatest force over all directions, the greatest torque and the mean torque, in the middle of the cut.
 The exit code is 1 where fewer than 99 % are within the stated error, one is beyond twice that, or the median of the
@@ -265,11 +266,27 @@ def simulated(seed: int) -> tuple[np.ndarray, np.ndarray]:
     return errors_of_simulation(*random_cut(seed, kind), step)
 
 
+def read_results(path: Path | None) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """True and stated errors of the cuts in a file of results, by seed."""
+    if path is None or not path.exists():
+        return {}
+    lines = [line.split() for line in path.read_text(encoding="utf-8").splitlines()]
+    numbers = {int(line[0]): np.array(line[2:], dtype=float) for line in lines if len(line) == 8}
+    return {seed: (some[:3], some[3:]) for seed, some in numbers.items()}
+
+
+def append_result(path: Path, seed: int, off: np.ndarray, stated: np.ndarray) -> None:
+    """Write one cut at the end of a file of results."""
+    with path.open("a", encoding="utf-8") as file:
+        file.write(" ".join([str(seed), kind_of(seed), *(f"{x:.6g}" for x in [*off, *stated])]) + "\n")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("number", nargs="?", type=int, default=2000)
     parser.add_argument("--first", type=int, default=10_000)
     parser.add_argument("--kind", nargs="*", choices=KINDS, default=KINDS)
+    parser.add_argument("--results", type=Path)
     parser.add_argument("--chips", type=int, default=0)
     parser.add_argument("--walls", type=int, default=0)
     given = parser.parse_args()
@@ -283,10 +300,12 @@ def main() -> int:
         walls = np.array([error_of_wall(*random_wall(s)) for s in range(given.first, given.first + given.walls)])
         right &= say("walls, form_error_um", *walls.T)
     found: dict[str, list[tuple[int, np.ndarray, np.ndarray]]] = {kind: [] for kind in given.kind}
-    nothing = 0
+    nothing, known = 0, read_results(given.results)
     for seed in range(given.first, given.first + given.number):
         if kind_of(seed) in found:
-            off, stated = simulated(seed)
+            off, stated = known.get(seed) or simulated(seed)
+            if given.results is not None and seed not in known:
+                append_result(given.results, seed, off, stated)
             nothing += int((off == -1.0).all())
             found[kind_of(seed)] += [] if (off == -1.0).all() else [(seed, off, stated)]
     print(f"{nothing} cuts are unproven because nothing is cut")

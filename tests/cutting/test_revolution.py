@@ -120,3 +120,64 @@ def test_entries_that_cut_alike_have_the_loads_of_the_first(runout: float) -> No
     assert (each[:, 3, 9] != each[:, 2, 9]).mean() > 0.95
     assert each[:, 3, 14].max() > 0.0
     assert each[:, 4, 14].max() == 0.0
+
+
+def peaks(front: ToothEngagement, cutter: Cutter) -> np.ndarray:
+    """Greatest force and greatest torque of a front."""
+    theta = math.tau * np.arange(720) / 720
+    force, torque = forces_over_turn(chips_of_teeth(front, cutter), cutter, STEEL, theta)
+    return np.array([np.linalg.norm(force[0], axis=1).max(), torque[0].max()])
+
+
+def test_borders_that_run_are_those_of_many_slices() -> None:
+    """One slice whose borders run along it, at rates of their own, against 2,000 whose borders do not."""
+    cutter, count = Cutter(10.0, 2, 0.4, 20.0, 30.0, 6e5), 2000
+    row, slices = [1.0, 2.2, 0.0, 2.0, 0.1, 0.0, 0.02], [0.0, 3.0, 0.5, 0.8, 0.6, 0.2, 0.05]
+    for low, high in ((-0.1, 0.15), (0.1, 0.15), (0.2, -0.2), (0.0, -0.05)):
+        own = [*slices, low, high, 1.0, 1.0, 1.2, 0.0]
+        one = ToothEngagement([0, 1], [row], [-1], [0], [own], np.eye(3)[None])
+        s = np.linspace(0.0, 2.0, count + 1)
+        off = 0.5 * (s[1:] + s[:-1]) - 1.0
+        rows = np.tile(row, (count, 1))
+        rows[:, :4] = np.column_stack([1.0 + low * off, 2.2 + high * off, s[:-1], s[1:]])
+        many = np.tile(slices, (count, 1))
+        many[:, 0], many[:, 5] = s[:-1], 0.2 + 0.05 * s[:-1]
+        dense = ToothEngagement([0, count], rows, np.full(count, -1), np.arange(count), many)
+        theta = np.linspace(0.0, math.tau, 240, endpoint=False)
+        known, known_torque = forces_over_turn(dense, cutter, STEEL, theta)
+        force, torque = forces_over_turn(one, cutter, STEEL, theta)
+        np.testing.assert_allclose(force, known, atol=2e-3 * np.abs(known).max())
+        np.testing.assert_allclose(torque, known_torque, atol=2e-3 * known_torque.max())
+        found = loads_over_turn(one, cutter, STEEL, math.radians(3.0), np.zeros((1, 3)))[0]
+        each = _one_by_one(one, cutter, STEEL, rotations(cutter, math.radians(3.0)), np.zeros((1, 3)))
+        # the means are those of the middle
+        kept = [3, 4, 5, 6, 7, 8, 9, 11]
+        np.testing.assert_allclose(found[:, kept], each[:, kept], rtol=1e-6, atol=1e-6)
+
+
+def test_the_chip_at_a_wall_runs_with_its_border() -> None:
+    """A ball beside a wall: six slices whose borders run are within 1 % of 300, others are 4 % off."""
+    R, wall, deep, fz = 8.0, 6.9, 5.0, 0.17
+    cutter = Cutter(2.0 * R, 6, math.radians(30.0), 40.0, 50.0, 6e5, corner_radius=R)
+    lead = math.tan(math.radians(30.0)) / R
+
+    def front(count: int, runs: bool) -> ToothEngagement:
+        ends = np.linspace(math.asin(wall / R), math.acos(1.0 - deep / R), count + 1)
+        a, b = ends[:-1], ends[1:]
+        mid, s = 0.5 * (a + b), R * ends
+
+        def wide(kappa: np.ndarray) -> np.ndarray:
+            return np.arccos(np.clip(wall / (R * np.sin(kappa)), -1.0, 1.0))
+
+        sk, none = np.sin(mid), np.zeros(count)
+        rows = np.column_stack([none, wide(mid), s[:-1], s[1:], fz * sk, none, none])
+        z = R * (1.0 - np.cos(a))
+        table = np.column_stack([s[:-1], R * sk, z, sk, np.cos(mid), lead * z, lead * sk])
+        if runs:
+            rate = (wide(b) - wide(a)) / (R * (b - a))
+            table = np.column_stack([table, none, rate, R * mid, none, wide(mid), none])
+        return ToothEngagement([0, count], rows, np.full(count, -1), np.arange(count), table)
+
+    known = peaks(front(300, False), cutter)
+    assert (np.abs(peaks(front(6, True), cutter) / known - 1.0) < 0.01).all()
+    assert (peaks(front(6, False), cutter) / known - 1.0 > 0.03).all()

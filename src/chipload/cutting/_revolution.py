@@ -15,6 +15,8 @@ import math
 import numpy as np
 from numba import njit, types
 
+from chipload.cutting._tooth_force import chip_at_border, edge, part_between, run_of
+
 TAU = 2.0 * math.pi
 #: lag over an engagement range below which an edge counts as straight [rad]
 STRAIGHT = 1e-5
@@ -172,6 +174,25 @@ def add_part(acc, m0, k0, k1, m1, at, step, back, table, first, last, p, q, w, a
 
 
 @njit(cache=True, nogil=True)
+def add_between_borders(acc, m0, k0, k1, m1, step, back, row, slices, k, base, p, q, run_p, run_q, c):
+    """:func:`add_part` of a range whose borders p and q run along the edge, with the rates ``run_p`` and ``run_q``."""
+    rate = slices[k, 6]
+    for i in range(m1 - m0 - (k1 - k0)):
+        m = m0 + i if i < k0 - m0 else i + m0 + k1 - k0
+        theta = back + step * m
+        s1, s2 = part_between(theta, base, rate, p, q, run_p, run_q, slices[k, 9], row[2], row[3])
+        ds = s2 - s1
+        if ds > 0.0:
+            mid = theta - base - 0.5 * rate * (s1 + s2)
+            along, across = chip_at_border(slices, k, row[4], row[6], run_p, run_q, 0.5 * (s1 + s2))
+            t, n, a, torque = edge(mid, 0.5 * rate * ds, along, row[5], across, slices[k, 3], slices[k, 4], c)
+            acc[0, m] += ds * t
+            acc[1, m] += ds * n
+            acc[2, m] += ds * a
+            acc[3, m] += ds * slices[k, 1] * torque
+
+
+@njit(cache=True, nogil=True)
 def same(i, j, start, rows, tooth, piece, slices, frame, left):
     """Whether entries i and j have the same engagement, as the steps along a straight row have."""
     count = start[i + 1] - start[i]
@@ -192,6 +213,9 @@ def same(i, j, start, rows, tooth, piece, slices, frame, left):
         for d in range(7):
             if abs(rows[r, d] - rows[q, d]) > (SAME if d < 4 else thick):
                 return False
+            if abs(slices[piece[r], d] - slices[piece[q], d]) > SAME:
+                return False
+        for d in range(7, slices.shape[1]):
             if abs(slices[piece[r], d] - slices[piece[q], d]) > SAME:
                 return False
     return True
@@ -292,11 +316,16 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
             rate = slices[k, 6]
             size = rows[r, 3] - rows[r, 2]
             chip = max(chip, thickest(p, q, along, across) + offset)
+            run_p = run_of(slices, k, p)
+            run_q = run_of(slices, k, q)
+            runs = run_p != 0.0 or run_q != 0.0
             one = tooth[r] >= 0
             for j in range(1 if one or alike else teeth):
                 lag = slices[k, 5] + rate * (rows[r, 2] - slices[k, 0])
                 lag += TAU * (tooth[r] if one else j) / teeth
                 last = lag + rate * size
+                from_lag = lag
+                to_lag = last
                 straight = last - lag < STRAIGHT
                 mid = 0.5 * (lag + last)
                 half = 0.5 * (last - lag)
@@ -310,9 +339,23 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
                     twice = even * math.cos(half)
                 cm = math.cos(mid)
                 sm = math.sin(mid)
-                # rotations at which part of the edge cuts
-                m0 = math.ceil((p + lag) / step)
-                m1 = math.ceil((q + last) / step)
+                # rotations at which the first and the last of the edge begins and ends to cut
+                begin = p + lag
+                all_in = p + last
+                first_out = q + lag
+                end = q + last
+                if runs:
+                    low = run_p * (rows[r, 2] - slices[k, 9])
+                    high = run_p * (rows[r, 3] - slices[k, 9])
+                    begin = min(p + from_lag + low, p + to_lag + high)
+                    all_in = max(p + from_lag + low, p + to_lag + high)
+                    low = run_q * (rows[r, 2] - slices[k, 9])
+                    high = run_q * (rows[r, 3] - slices[k, 9])
+                    first_out = min(q + from_lag + low, q + to_lag + high)
+                    end = max(q + from_lag + low, q + to_lag + high)
+                whole = straight and not runs
+                m0 = math.ceil(begin / step)
+                m1 = math.ceil(end / step)
                 while m0 < m1:
                     turn = m0 // count
                     m2 = min(m1, (turn + 1) * count)
@@ -321,15 +364,20 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
                     a0 = m0 - turn * count
                     a1 = m2 - turn * count
                     # rotations at which all of it cuts
-                    k0 = a0 if straight else min(max(math.ceil((p + last - back) / step), a0), a1)
-                    k1 = a1 if straight else max(min(math.floor((q + lag - back) / step) + 1, a1), k0)
+                    k0 = a0 if whole else min(max(math.ceil((all_in - back) / step), a0), a1)
+                    k1 = a1 if whole else max(min(math.floor((first_out - back) / step) + 1, a1), k0)
                     if k1 > k0:
                         ca = table[0, at]
                         sa = table[1, at]
                         add_whole(
                             sums, k0, k1, cm * ca + sm * sa, sm * ca - cm * sa, even, twice, w, size, slices[k, 1]
                         )  # fmt: skip
-                    if k1 - k0 < a1 - a0:
+                    if runs and k1 - k0 < a1 - a0:
+                        add_between_borders(
+                            acc, a0, k0, k1, a1, step, back, rows[r], slices, k, from_lag - rate * rows[r, 2], p, q,
+                            run_p, run_q, c,
+                        )  # fmt: skip
+                    elif k1 - k0 < a1 - a0:
                         add_part(acc, a0, k0, k1, a1, at, step, back, table, lag, last, p, q, w, slices[k, 1], rate)
                     m0 = m2
         sum_whole_edges(sums, turned, acc)

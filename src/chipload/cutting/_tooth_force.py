@@ -140,6 +140,52 @@ def engaged_part(turn, base, rate, p, q, s1, s2):
 
 
 @njit(cache=True, nogil=True)
+def run_of(slices, k, phi):
+    """Rate [rad/mm] at which a border at ``phi`` runs along slice k."""
+    if slices.shape[1] < 13 or slices[k, 11] <= 0.0:
+        return 0.0
+    d = phi - slices[k, 10]
+    d -= TAU * math.floor((d + 0.5) / TAU)
+    return slices[k, 7] + min(max(d / slices[k, 11], 0.0), 1.0) * (slices[k, 8] - slices[k, 7])
+
+
+@njit(cache=True, nogil=True)
+def part_between(turn, base, rate, p, q, run_p, run_q, middle, s1, s2):
+    """Part of the edge s1 .. s2 [mm], lagging by base + rate s, between borders that run: they are p and q at s =
+    ``middle``; none: the second is not above the first.
+    """
+    # not before it has passed p
+    slope = rate + run_p
+    rest = turn - base - p + run_p * middle
+    if slope > FLAT:
+        s2 = min(s2, rest / slope)
+    elif slope < -FLAT:
+        s1 = max(s1, rest / slope)
+    elif rest < 0.0:
+        return s1, s1
+    slope = rate + run_q
+    rest = turn - base - q + run_q * middle
+    if slope > FLAT:
+        s1 = max(s1, rest / slope)
+    elif slope < -FLAT:
+        s2 = min(s2, rest / slope)
+    elif rest > 0.0:
+        return s1, s1
+    return s1, s2
+
+
+@njit(cache=True, nogil=True)
+def chip_at_border(slices, k, along, across, run_p, run_q, s):
+    """Chip (along, across) at ``s`` of slice k: one that runs out along a wall runs with the border."""
+    if slices[k, 12] == 0.0:
+        return along, across
+    turned = 0.5 * (run_p + run_q) * (s - slices[k, 9])
+    si = math.sin(turned)
+    co = math.cos(turned)
+    return along * co + across * si, across * co - along * si
+
+
+@njit(cache=True, nogil=True)
 def load(theta, rows, tooth, piece, slices, lo, hi, teeth, c):
     """Force on the cutter along T, n and the axis [N] and torque [N mm] at one rotation, in closed form where the law
     is linear.
@@ -158,17 +204,31 @@ def load(theta, rows, tooth, piece, slices, lo, hi, teeth, c):
         base = slices[k, 5] - rate * slices[k, 0]
         first = base + rate * sa
         last = base + rate * sb
+        run_p = run_of(slices, k, p)
+        run_q = run_of(slices, k, q)
+        runs = run_p != 0.0 or run_q != 0.0
+        middle = slices[k, 9] if runs else sa
+        begin = min(first + run_p * (sa - middle), last + run_p * (sb - middle))
+        end = q + max(first + run_q * (sa - middle), last + run_q * (sb - middle))
         one = tooth[r] >= 0
         for i in range(1 if one else teeth):
             j = tooth[r] if one else i
-            turn = first_turn(theta, j, teeth, p, first)
-            while turn - last <= q:
-                s1, s2 = engaged_part(turn, base, rate, p, q, sa, sb)
+            turn = first_turn(theta, j, teeth, p, begin)
+            while turn - TAU >= p + begin:
+                turn -= TAU
+            while turn <= end:
+                along = rows[r, 4]
+                across = rows[r, 6]
+                if runs:
+                    s1, s2 = part_between(turn, base, rate, p, q, run_p, run_q, middle, sa, sb)
+                    along, across = chip_at_border(slices, k, along, across, run_p, run_q, 0.5 * (s1 + s2))
+                else:
+                    s1, s2 = engaged_part(turn, base, rate, p, q, sa, sb)
                 ds = s2 - s1
                 if ds > 0.0:
                     mid = turn - base - 0.5 * rate * (s1 + s2)
                     half = 0.5 * rate * ds
-                    t, n, a, m = edge(mid, half, rows[r, 4], rows[r, 5], rows[r, 6], slices[k, 3], slices[k, 4], c)
+                    t, n, a, m = edge(mid, half, along, rows[r, 5], across, slices[k, 3], slices[k, 4], c)
                     ft += ds * t
                     fn += ds * n
                     fa += ds * a

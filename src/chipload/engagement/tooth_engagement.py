@@ -53,7 +53,9 @@ class ToothEngagement:
     tooth : (b,) int; which tooth; -1: every tooth
     slice : (b,) int; the row of ``slices`` in which the engagement range's s lies
     slices : (k, 7) float: s from [mm], rho [mm], z at s from [mm], sin(kappa), cos(kappa), lag at s from [rad], rate of
-        the lag [rad/mm]; ``Slices.columns``
+        the lag [rad/mm]; ``Slices.columns``. Or (k, 13), where borders run along the edge: rates at the beginning
+        and at the end of the range of the front [rad/mm], s at which it is stated, that range, from and width [rad],
+        and 1 where the chip runs with the border; a border between them runs with a rate between theirs
     frame : (n, 3, 3) float: rows T, n, A in the frame of the work; None: not needed
     """
 
@@ -72,7 +74,7 @@ class ToothEngagement:
         slices = np.ascontiguousarray(self.slices, dtype=np.float64)
         if rows.ndim != 2 or rows.shape[1] != 7 or not np.isfinite(rows).all():
             raise InputError(f"tooth engagement: rows of shape {rows.shape}: need (b, 7) finite numbers")
-        if slices.ndim != 2 or slices.shape[1] != 7 or not np.isfinite(slices).all():
+        if slices.ndim != 2 or slices.shape[1] not in (7, 13) or not np.isfinite(slices).all():
             raise InputError(f"tooth engagement: slices of shape {slices.shape}: need (k, 7) finite numbers")
         if len(tooth) != len(rows) or start[0] != 0 or start[-1] != len(rows) or (np.diff(start) < 0).any():
             raise InputError(

@@ -46,9 +46,9 @@ SHARE = 0.01
 #: radial depth
 LEAST, UNLIKE, SECOND, RUNOUT = 0.0025, 0.002, 0.75, 0.04
 #: the same where the surface leans, as that of a ball nose or a cone: at any cut, of the feed over the radius and of
-#: its square, which counts near a tip; of the runout over the greatest radial depth of the step and of its square: a
-#: longer tooth also cuts on parts of the edge that no circle reaches
-LEANS, NARROW, POINT, TIP, BEYOND = 0.002, 0.1, 10.0, 0.07, 4.0
+#: its square, which counts near a tip; with runout at any cut, of the runout over the greatest radial depth of the step
+#: and of its square: a longer tooth also cuts on parts of the edge that no circle reaches
+LEANS, NARROW, POINT, STANDS, TIP, BEYOND = 0.001, 0.05, 2.0, 0.002, 0.07, 2.5
 
 
 def tooth_radii(cutter: Cutter, lag: ArrayLike = 0.0) -> Floats:
@@ -122,7 +122,15 @@ def chips_and_paths(front: ToothEngagement, cutter: Cutter) -> tuple[ToothEngage
         own, many = own + np.maximum(tooth, 0) * len(slices), len(slices)
         slices = np.tile(slices, (N, 1))
         slices[:, 5] += np.repeat(late - late.min(), many)
-    return ToothEngagement(room, rows, tooth, own, slices, front.frame), parent, before[:count].copy()
+    before = before[:count].copy()
+    if slices.shape[1] > 7:
+        # what runs out along a wall runs with it
+        walls = np.flatnonzero((before == 0) & (slices[own, 11] > 0.0))
+        more = slices[own[walls]]
+        more[:, 12] = 1.0
+        own[walls] = len(slices) + np.arange(len(walls))
+        slices = np.vstack([slices, more])
+    return ToothEngagement(room, rows, tooth, own, slices, front.frame), parent, before
 
 
 def thickest_of_teeth(plain: ArrayLike, cutter: Cutter, sine: ArrayLike = 1.0, lags: ArrayLike = (0.0,)) -> Floats:
@@ -158,8 +166,8 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     leave out: 0.0025 + 0.75 (f / R)^2 / phi_w + 0.04 e / max(ae, e), phi_w the engaged arc, ae its radial depth.
 
     With runout 0.002 is added. Where a range moves along the axis and leans, its chip is of first order in that motion:
-    f / R is added. A surface that leans has 0.002 + 0.1 f / R + 10 (f / R)^2 more, at most f / R; with
-    runout 0.07 x + 4 x^2, x = e / ae at most 1, ae the greatest radial depth of the step.
+    f / R is added. A surface that leans has 0.001 + 0.05 f / R + 2 (f / R)^2 more, at most f / R; with
+    runout 0.002 + 0.07 x + 2.5 x^2, x = e / ae at most 1, ae the greatest radial depth of the step.
     Ranges count by their share of the chip. 0 where nothing is cut.
 
     The constants are those within which random cuts by all kinds of mills lie (benchmarks/truth.py).
@@ -190,7 +198,7 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
         widest = np.zeros(len(front))
         np.maximum.at(widest, step, depth)
         x = e / np.maximum(widest[step], e)
-        each += np.where(leans, TIP * x + BEYOND * x * x, 0.0)
+        each += np.where(leans, STANDS + TIP * x + BEYOND * x * x, 0.0)
     weight = (swing + np.abs(offset)) * np.maximum(high - low, 1e-12) * (s1 - s0)
     whole = np.bincount(step, weight, len(front))
     return np.divide(np.bincount(step, weight * each, len(front)), whole, out=np.zeros(len(front)), where=whole > 0.0)

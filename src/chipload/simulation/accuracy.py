@@ -35,11 +35,12 @@ at most SHARE of the steps of the run, and as many again for the last kind; the 
 computed in any case.
 
 **Resolution error** by moves: the stock has no layers. The earlier steps that reach into the box are removed from the
-initial body. The step is computed with MORE times the slices and half the angle between rotations, once at the same
+initial body. The step is computed with MORE times the slices and FINER times the rotations, once at the same
 instants, which gives f - c, and once in halves, which gives the loads above the worst. The contact is exact, so that a
 load that differs between the halves of a step, as where the cutter enters, is not an error of the resolution unless it
-exceeds every load of the run. FLOOR is :data:`MOVES_FLOOR`: with twice the difference of the two resolutions and what
-the chips leave out it holds the true loads of random cuts by all kinds of mills (benchmarks/truth.py,
+exceeds every load of the run. FACTOR is :data:`MOVES_FACTOR` where the axis is upright: four times as many slices and
+rotations leave a quarter of a first order. FLOOR is :data:`MOVES_FLOOR`: with the difference of the two resolutions and
+what the chips leave out it holds the true loads of random cuts by all kinds of mills (benchmarks/truth.py,
 docs/design/engines.md). If all cutters have a straight flank and a flat bottom, on which slices are exact, it is
 :data:`FLAT_FLOOR`; if an axis leans, :data:`LEANING_MOVES_FLOOR`.
 
@@ -112,13 +113,13 @@ SHARE, LEAST = 0.05, 60
 MISSED_SHARE, MISSED_LEAST = 0.05, 1000
 #: least number of slices of the corner in the finer run
 FINE = 48
-#: factor on the difference of the two resolutions: upright axis, leaning axis
-FACTOR, LEANING = 2.0, 3.0
+#: factor on the difference of the two resolutions: upright axis by layers and by moves, leaning axis
+FACTOR, MOVES_FACTOR, LEANING = 2.0, 1.5, 3.0
 #: error that both resolutions share: upright axis, leaning axis
 FLOOR, LEANING_FLOOR = 0.01, 0.02
 #: by moves: error of a column that a few steps do not show
 MOVES_FLOOR = {
-    "force_n": 0.005, "torque_nm": 0.005, "torque_mean_nm": 0.005, "power_w": 0.005, "chip_max_mm": 0.035,
+    "force_n": 0.003, "torque_nm": 0.003, "torque_mean_nm": 0.003, "power_w": 0.003, "chip_max_mm": 0.035,
     "force_normal_n": 0.035, AXIAL: 0.035,
 }  # fmt: skip
 #: the same if all cutters are flat mills with a straight flank: slices are exact, and what is left are places between
@@ -137,8 +138,8 @@ LEANING_MOVES_FLOOR = {
     "force_n": 0.05, "torque_nm": 0.05, "torque_mean_nm": 0.02, "power_w": 0.02, "chip_max_mm": 0.05,
     "force_normal_n": 0.05, AXIAL: 0.05,
 }  # fmt: skip
-#: by moves: number of slices of the finer run over that of the run
-MORE = 4
+#: by moves: number of slices of the finer run over that of the run, and of its rotations
+MORE, FINER = 4, 4
 #: layers of the finer stock: thickness of the lowest in diameters, and ratio to the thickness of the layer below
 LOWEST, GROWTH = 5e-4, 1.3
 #: steps that are computed besides the worst ones
@@ -264,11 +265,13 @@ def resolution_error(
             continue
         alike, halves, some = again(window)
         _keep_worst(parts, int(window.own.tool[0]), some)
+        by_heights = setting.moves is not None and setting.moves.upright
+        factor = MOVES_FACTOR if by_heights else window.factor
         for name in names:
             c, w = float(columns[name][step]), worst[name]
             same = alike.get(name, c)
             off = max(halves[name] - w, abs(same - c) if c >= 0.5 * w else same - w)
-            excess[name] = max(excess[name], window.factor * off)
+            excess[name] = max(excess[name], factor * off)
             if max(c, halves[name]) >= 0.5 * w:
                 chip[name] = max(chip[name], halves[CHIP])
     spent = 0
@@ -432,7 +435,7 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
     step.
     """
     flank = {n: length / MORE for n, length in run.flank_mm.items()}
-    rotation = 0.5 * setting.resolution.rotation
+    rotation = setting.resolution.rotation / FINER
 
     def loads_of(
         window: Window, own: Steps, more: tuple[int, int] | None

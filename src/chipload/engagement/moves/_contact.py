@@ -15,7 +15,16 @@ import math
 from numba import njit, types
 
 from chipload.engagement.moves._circle import ALONG, APART, intervals
-from chipload.engagement.moves._edge import FLANK, SAME, add_slice, candidates, slice_profile, windows
+from chipload.engagement.moves._edge import (
+    FLANK,
+    SAME,
+    add_slice,
+    arc_of,
+    candidates,
+    slice_arc_again,
+    slice_profile,
+    windows,
+)
 from chipload.engagement.moves._flank import BEGIN, COUNT, divide_flank
 from chipload.engagement.moves._sweep import CUTTERS, keep
 from chipload.engagement.moves._uncounted_arrays import borrow_arrays
@@ -29,6 +38,9 @@ LEVELS = 32
 STEADY, JUMP = 0.03, 0.3
 #: halvings of the distance between two slices for the border of a hole under a tool that goes down its axis
 HALVINGS = 12
+#: slices at an end of an arc that are not in contact, from which on its slices are placed again beyond the last of
+#: them, and how often at most: in a thin layer most of the part of the arc that may be in contact is not
+FREE, AGAIN = 2, 2
 #: cosine of the least angle between two moves that make a corner
 CORNER = 0.985
 
@@ -189,15 +201,36 @@ def find_engagement(
     add_slice(scratch, number, 0.0, 0.0, c.wide, c.height, 1.0, 0.0, c.height, c.wide, c.wide)
     windows(near, count, 0.5 * math.hypot(grid[2], grid[3]), scratch, number + 1)
     first_row = at[0]
+    first_slice = at[1]
     out[2] = math.inf
     out[3] = -math.inf
     flank_from = number
     while flank_from > 0 and scratch[flank_from - 1, FLANK] >= 0.0:
         flank_from -= 1
+    # of a cutter that meets the material with one arc
+    bow = arc_of(c, scratch[0, 0], scratch[number - 1, 1]) if number == len(parts) == flank_from else -1
+    again = AGAIN if bow >= 0 else 0
     free = -1
-    for n in range(flank_from + 1):
+    lowest = -1
+    highest = -1
+    n = 0
+    while n <= flank_from:
         # last above the flutes
         k = n if n < flank_from else number
+        n += 1
+        if k == number and again > 0 and highest >= 0 and highest < number - FREE:
+            # again below the lowest of the free slices at the upper end
+            again -= 1
+            slice_arc_again(c, bow, lowest - 1, highest + 1, parts, scratch)
+            windows(near, count, 0.5 * math.hypot(grid[2], grid[3]), scratch, number + 1)
+            at[0] = first_row
+            at[1] = first_slice
+            out[:] = 0.0
+            out[2] = math.inf
+            out[3] = -math.inf
+            free = lowest = highest = -1
+            n = 0
+            continue
         rho = scratch[k, 2]
         end = leading_angle(scratch[k, 4] * hu, scratch[k, 5] * u[2], hu + abs(u[2]))
         low = max(scratch[k, 9], -end)
@@ -208,6 +241,17 @@ def find_engagement(
         if found == 0:
             free = k
             continue
+        if again > 0 and lowest < 0 and FREE <= k < number:
+            # again above the highest of the free slices at the lower end
+            again -= 1
+            slice_arc_again(c, bow, k - 1, number, parts, scratch)
+            windows(near, count, 0.5 * math.hypot(grid[2], grid[3]), scratch, number + 1)
+            free = -1
+            n = 0
+            continue
+        if lowest < 0:
+            lowest = k
+        highest = k
         if hu == 0.0 and k < number and scratch[k, 7] > 0.0 and on_line(scratch, k):
             alike = k > 0 and scratch[k - 1, 1] == scratch[k, 0] and scratch[k - 1, 4] == scratch[k, 4]
             if not alike or free == k - 1:

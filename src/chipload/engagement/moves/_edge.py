@@ -14,8 +14,8 @@ from chipload.engagement.moves._sweep import profile
 from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 PI = math.pi
-#: heights closer than this count as one [mm]
-SAME = 1e-6
+#: heights closer than this count as one [mm], and ends of slices
+SAME, PLACE = 1e-6, 1e-9
 #: column of a slice: 0 for one of the flank, 1 for one of the flank that begins at a height of the stock, else below 0
 FLANK = 11
 #: number of slices of the part of a corner whose circles cut all round in a downward motion, where there is material
@@ -156,6 +156,32 @@ def add_arc(out, k, c, i, k0, k1, mid):
         f - r * math.cos(k0), math.sin(mid), math.cos(mid), f - r * math.cos(mid), e + r * math.sin(k0),
         e + r * math.sin(k1),
     )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def arc_of(c, s0, s1):
+    """The arc of a cutter on which a part of the profile from s0 to s1 lies; -1: none."""
+    for i in range(c.count):
+        end = c.s[i] + c.radius[i] * (c.kappa_to[i] - c.kappa[i])
+        if c.radius[i] > 0.0 and s0 > c.s[i] - PLACE and s1 < end + PLACE:
+            return i
+    return -1
+
+
+@njit(cache=True, nogil=True)
+def slice_arc_again(c, i, low, high, parts, out):
+    """Place the slices of the arc i, which ``out`` begins with, between the circles of two of them; ``low`` below 0,
+    ``high`` beyond the last: to where they begin and end now.
+    """
+    many = len(parts)
+    a = c.kappa[i] + (out[0, 0] - c.s[i]) / c.radius[i]
+    b = c.kappa[i] + (out[many - 1, 1] - c.s[i]) / c.radius[i]
+    if low >= 0:
+        a = math.atan2(out[low, 4], out[low, 5])
+    if high < many:
+        b = math.atan2(out[high, 4], out[high, 5])
+    for j in range(many):
+        add_arc(out, j, c, i, a + (b - a) * parts[j, 0], a + (b - a) * parts[j, 1], a + (b - a) * parts[j, 2])
 
 
 @njit(cache=True, nogil=True)

@@ -3,8 +3,10 @@
 Notation: psi [rad] as in :mod:`chipload.engagement.moves._contact`, s [mm] along the profile, kappa the angle of
 its normal. The contact of a slice is known at one place of it. Where the slices before and after it are in contact once
 each, as it is, its borders go on to theirs: a slice of a corner is divided, and each part has the borders and the
-normal of its own middle, so that the edge of a tooth leaves the material bit by bit, as it does, and not a slice at a
-time. Where a border is the end of the front it is that of the part.
+normal of its own middle. Where a border is the end of the front it is that of the part.
+
+Within a part a border goes on too, at a rate that its slice of the tooth engagement states, so that the edge of a
+tooth leaves the material bit by bit, as it does, and not a part at a time.
 """
 
 from __future__ import annotations
@@ -13,10 +15,13 @@ import math
 
 from numba import njit, types
 
+from chipload.engagement.moves._edge import arc_of
 from chipload.engagement.moves._sweep import CUTTERS
 
 #: by how much a border may run over a part [rad], and most parts of a slice
-SKEW, PARTS = 0.06, 3
+SKEW, PARTS = 0.12, 3
+#: most that a border runs within a part [rad]
+RUN = 0.5
 #: ends of slices that are this near are one [mm], and a border this near to the end of the front is at it [rad]
 SAME, NEAR = 1e-9, 1e-6
 
@@ -32,13 +37,21 @@ def alone(piece, first, last, r):
 
 
 @njit(cache=True, nogil=True)
-def arc_of(c, s0, s1):
-    """The arc of a cutter on which a slice from s0 to s1 lies; -1: none."""
-    for i in range(c.count):
-        end = c.s[i] + c.radius[i] * (c.kappa_to[i] - c.kappa[i])
-        if c.radius[i] > 0.0 and s0 > c.s[i] - SAME and s1 < end + SAME:
-            return i
-    return -1
+def follows(piece, slices, first, last, r):
+    """Whether rows r and r + 1 are the only ones of slices that follow one another."""
+    return (
+        first <= r
+        and r + 1 < last
+        and alone(piece, first, last, r)
+        and alone(piece, first, last, r + 1)
+        and abs(slices[piece[r], 1] - slices[piece[r + 1], 0]) < SAME
+    )
+
+
+@njit(cache=True, nogil=True, inline="always")
+def place_of(c, bow, slices, k):
+    """Place s of the circle of slice k on the arc ``bow``."""
+    return c.s[bow] + c.radius[bow] * (math.atan2(slices[k, 4], slices[k, 5]) - c.kappa[bow])
 
 
 @njit(cache=True, nogil=True)
@@ -76,6 +89,22 @@ def add_slice(table, k, s0, rho, z, sk, ck, lead):
     # an arc on the bottom begins at 0 but for rounding
     table[k, 5] = lead * max(z, 0.0)
     table[k, 6] = lead * sk
+    table[k, 7:] = 0.0
+
+
+@njit(cache=True, nogil=True, inline="always")
+def let_borders_run(table, k, s0, s1, row, rate_a, rate_b, hand):
+    """State of slice k, from s0 to s1, the rates of the borders of its only row: those of psi are ``rate_a`` and
+    ``rate_b`` [rad/mm], with which immersion falls where the spindle turns clockwise.
+    """
+    if s1 <= s0:
+        return
+    most = RUN / (s1 - s0)
+    table[k, 7] = min(max(-rate_b if hand > 0.0 else rate_a, -most), most)
+    table[k, 8] = min(max(-rate_a if hand > 0.0 else rate_b, -most), most)
+    table[k, 9] = 0.5 * (s0 + s1)
+    table[k, 10] = row[0]
+    table[k, 11] = row[1] - row[0]
 
 
 @njit(
@@ -110,26 +139,42 @@ def tooth_rows(entries, start, span, piece, slices, cutters, lead, hand, across,
             s1 = slices[k, 1]
             a = span[r, 0]
             b = span[r, 1]
-            # by how much the borders run over the slice
-            skew_a = 0.0
-            skew_b = 0.0
+            # rates of the borders at the circle of the slice, and half those of these rates: of the parabola through
+            # three slices, this one in their middle where it is not the first or the last
+            rate_a = rate_b = bend_a = bend_b = 0.0
             bow = arc_of(c, s0, s1)
-            if bow >= 0 and alone(piece, first, last, r):
-                whole = 0.0
-                low = r
-                high = r
-                if r > first and alone(piece, first, last, r - 1) and abs(slices[piece[r - 1], 1] - s0) < SAME:
-                    low = r - 1
-                    whole += 0.5 * (s1 - slices[piece[low], 0])
-                if r + 1 < last and alone(piece, first, last, r + 1) and abs(slices[piece[r + 1], 0] - s1) < SAME:
-                    high = r + 1
-                    whole += 0.5 * (slices[piece[high], 1] - s0)
-                if whole > 0.0:
-                    skew_a = (span[high, 0] - span[low, 0]) * (s1 - s0) / whole
-                    skew_b = (span[high, 1] - span[low, 1]) * (s1 - s0) / whole
-            parts = min(max(math.ceil(max(abs(skew_a), abs(skew_b)) / SKEW), 1), PARTS)
+            at = 0.5 * (s0 + s1)
+            if bow >= 0:
+                at = place_of(c, bow, slices, k)
+                before = follows(piece, slices, first, last, r - 1)
+                after = follows(piece, slices, first, last, r)
+                other = r - 1 if before else r + 1
+                third = -1
+                if before and after:
+                    third = r + 1
+                elif after and follows(piece, slices, first, last, r + 1):
+                    third = r + 2
+                elif before and follows(piece, slices, first, last, r - 2):
+                    third = r - 2
+                if before or after:
+                    x = place_of(c, bow, slices, piece[other]) - at
+                    rate_a = (span[other, 0] - a) / x
+                    rate_b = (span[other, 1] - b) / x
+                if third >= 0:
+                    y = place_of(c, bow, slices, piece[third]) - at
+                    bend_a = ((span[third, 0] - a) / y - rate_a) / (y - x)
+                    bend_b = ((span[third, 1] - b) / y - rate_b) / (y - x)
+                    rate_a -= bend_a * x
+                    rate_b -= bend_b * x
+            most = max(
+                abs(rate_a + 2.0 * bend_a * (s0 - at)), abs(rate_a + 2.0 * bend_a * (s1 - at)),
+                abs(rate_b + 2.0 * bend_b * (s0 - at)), abs(rate_b + 2.0 * bend_b * (s1 - at)),
+            )  # fmt: skip
+            parts = min(max(math.ceil(most * (s1 - s0) / SKEW), 1), PARTS)
             if parts == 1:
                 add_row(rows, count, a, b, s0, s1, slices[k, 4], slices[k, 5], hand[i], across[i], rise[i])
+                if most > 0.0:
+                    let_borders_run(table, k, s0, s1, rows[count], rate_a, rate_b, hand[i])
                 rows_of[count] = k
                 count += 1
                 continue
@@ -141,9 +186,9 @@ def tooth_rows(entries, start, span, piece, slices, cutters, lead, hand, across,
                 sk = math.sin(kappa)
                 ck = math.cos(kappa)
                 own = leading_end(across[i], rise[i], sk, ck)
-                off = (j + 0.5) / parts - 0.5
-                low_psi = max(a + off * skew_a, -own) if a > NEAR - end else -own
-                high_psi = min(b + off * skew_b, own) if b < end - NEAR else own
+                off = 0.5 * (t0 + t1) - at
+                low_psi = max(a + off * (rate_a + off * bend_a), -own) if a > NEAR - end else -own
+                high_psi = min(b + off * (rate_b + off * bend_b), own) if b < end - NEAR else own
                 if not high_psi > low_psi:
                     continue
                 add_row(rows, count, low_psi, high_psi, t0, t1, sk, ck, hand[i], across[i], rise[i])
@@ -152,6 +197,9 @@ def tooth_rows(entries, start, span, piece, slices, cutters, lead, hand, across,
                     table, made, t0, c.e[bow] + c.radius[bow] * sk,
                     c.f[bow] - c.radius[bow] * math.cos(c.kappa[bow] + (t0 - c.s[bow]) / c.radius[bow]), sk, ck, lead,
                 )  # fmt: skip
+                let_borders_run(
+                    table, made, t0, t1, rows[count], rate_a + 2.0 * off * bend_a, rate_b + 2.0 * off * bend_b, hand[i]
+                )
                 count += 1
                 made += 1
     begin[len(entries)] = count
