@@ -61,9 +61,6 @@ ENGAGED = 0.5
 LAYERED_FLANK = 0.1
 #: an axis that differs from z by no more than this is upright
 UPRIGHT = 1e-9
-#: rotations over those that are asked for, of an upright cutter that is no flat mill: where the contact runs along the
-#: edge as its lag does the whole edge enters at once, and 3 degrees beyond the peak the force is 2.5 % less
-SHARP = 3.0
 #: columns of the loads that are means, of :data:`chipload.simulation.loads.LOADS`
 MEANS = np.array([0, 1, 2, 10, 12, 15, 16])
 LEAST = np.array([6, 7, 8])
@@ -334,8 +331,7 @@ def remove_by_moves(
         step = found.step[entries]
         left, spindle = _normals_left(found, entries), np.abs(steps.spindle[step])
         seconds = steps.seconds[step]
-        apart = rotation / SHARP if run.upright and not cutter.straight else rotation
-        each, at, mean = loads_of_instants(plain, engagement, cutter, material, apart, left, spindle, seconds)
+        each, at, mean = loads_of_instants(plain, engagement, cutter, material, rotation, left, spindle, seconds)
         weight = 1.0 / found.instants[entries]
         _merge_instants(loads, step, each, weight)
         if material.has_band:
