@@ -82,6 +82,6 @@ def cell(seed: int, logs: int = 3) -> tuple[list[LogBlocks], Signal, Truth]:
         program = closed_form_program(rng)
         log = power_log(rng, truth, program, before, idle)
         assert log.power is not None
-        out.append(blocks_of(align_log(f"log {k}", log, log.power, program), program, before))
-        before += program.cut_seconds
+        out.append(blocks_of(align_log(f"log {k}", log, log.power, program), program, {1: before}))
+        before += program.cut_seconds[1]
     return out, SIGNAL, truth

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from chipload.control.learning import Signal, SignalKind, learn_material, signal_of_logs
+from chipload.control.learning import Signal, SignalKind, learn_from_logs, learn_material, signal_of_logs
 from chipload.control.log_alignment import align_log
 from chipload.control.log_blocks import blocks_of
 from chipload.control.logs import SpindleLog
+from chipload.cutting.material import material_text, read_material
 from chipload.errors import InputError
 from synthetic_cell import EFFICIENCY, PRIOR, Truth, cell, closed_form_program, power_log
 
@@ -30,7 +32,7 @@ def log(program):
 
 
 def blocks(log, program, name="log", before=0.0):
-    return blocks_of(align_log(name, log, log.power, program), program, before)
+    return blocks_of(align_log(name, log, log.power, program), program, {1: before})
 
 
 def test_coverage():
@@ -148,6 +150,33 @@ def test_another_program(log):
         align_log("log", log, log.power, other)
 
 
+def test_the_efficiency_is_one_however_often_is_learned(program, tmp_path):
+    """Five logs one after another, by files: Ktc cannot be known better than the efficiency, to 2 %. Errors that are
+    drawn anew with each log would leave 0.028 / sqrt(5), as efficiency and simulated torque are known to 2 % each.
+    """
+    material, truth = PRIOR, replace(TRUTH, wear=0.0)
+    for k in range(5):
+        own = power_log(np.random.default_rng(40 + k), truth, program, 0.0, IDLE)
+        found, _ = learn_from_logs({f"log {k}": own}, predicted_with(program, material), SIGNAL, material)
+        (tmp_path / "m.toml").write_text(material_text(found.material))
+        material = read_material(tmp_path / "m.toml")
+        assert material.learned.gain == found.gain
+    bound = 1.0 / math.hypot(1.0 / 0.25, 1.0 / SIGNAL.gain_error)
+    assert 0.95 * bound < found.deviations[1][0] < 1.3 * bound
+    assert abs(material.Ktc / PRIOR.Ktc - TRUTH.cutting) < 2.0 * bound
+    # by their product, but for what the error of the simulated torque leaves
+    gain = material.learned.gain
+    assert gain.with_ktc / (gain.deviation * found.deviations[1][0]) < -0.85
+    product = material.Ktc / PRIOR.Ktc * gain.ratio
+    assert product == pytest.approx(TRUTH.cutting * TRUTH.gain, rel=0.04)
+
+
+def predicted_with(program, material):
+    """The torque of a program with the coefficients of a material."""
+    cutting, edge = material.Ktc / PRIOR.Ktc, material.Kte / PRIOR.Kte
+    return replace(program, cutting=cutting * program.cutting, edge=edge * program.edge)
+
+
 def test_a_worn_tool(program):
     """An edge force that doubles over 10 minutes of cutting is seen as wear, within its interval."""
     worn = Truth(1.0, 1.0, 1.0, 1.0 / 600.0)
@@ -155,12 +184,18 @@ def test_a_worn_tool(program):
     for k in range(4):
         log = power_log(np.random.default_rng(20 + k), worn, program, before, IDLE)
         logs.append(blocks(log, program, f"log {k}", before))
-        before += program.cut_seconds
+        before += program.cut_seconds[1]
     found = learn_material(logs, SIGNAL, PRIOR)
     rate, error = found.wear[1]
     assert rate == pytest.approx(6.0, abs=2.0 * error)
     assert error < 1.0
     assert [f.code for f in found.findings] == ["log-wear"]
+    # and what a tool that stays takes next: twice the edge force after 600 s
+    after = learn_material(logs, SIGNAL, PRIOR, worn_s=before).material
+    edge = PRIOR.Kte * (1.0 + before / 600.0)
+    assert abs(after.Kte - edge) < 2.0 * after.variances[3, 3] ** 0.5
+    assert after.variances[3, 3] ** 0.5 < 0.12 * edge
+    assert after.Ktc == found.material.Ktc
 
 
 def test_contradicting_logs(program):

@@ -21,6 +21,9 @@ from chipload.program.program import Program
 from chipload.program.read import dialect_of
 from chipload.program.release import Release
 
+#: characters of a comment at most, and of the least one that is worth writing; of a line where the control states no
+#: limit; kept for the end of a line
+LONGEST_COMMENT, LEAST_COMMENT, LONGEST_LINE, LINE_END = 160, 24, 255, 4
 #: blocks that take no comment: the head of a conversational program, and a block that goes on
 _NO_COMMENT = re.compile(r"^\s*\d*\s*(?:BEGIN PGM|BLK FORM)\b|~$", re.IGNORECASE)
 
@@ -96,16 +99,20 @@ def rows_that_differ(old: Program, new: Program, *names: str) -> NDArray[np.bool
 def program_text(changed: ChangedText, release: Release) -> str:
     """Return the text of a program; if it is not verified, a comment on its first line states why.
 
-    A line of ``%`` alone, Sinumerik's paths and the head of a conversational program do not count as the first line.
+    A line of ``%`` alone, Sinumerik's paths and the head of a conversational program do not count as the first line,
+    nor does one that the comment would make longer than the control reads: LinuxCNC leaves such a line out and goes on.
     """
     if release.verified:
         return changed.text
     plain = "".join(ch if ch.isascii() and ch.isprintable() and ch not in "()" else "_" for ch in release.text)
-    comment = plain.join(control_named(changed.dialect).lines.comment)
+    control = control_named(changed.dialect)
+    begin, end = control.lines.comment
+    longest = control.text.longest_line or LONGEST_LINE
     lines = changed.text.split("\n")
     for k, line in enumerate(lines):
         body = line.rstrip()
-        if body and not body.startswith(("%", ";$")) and not _NO_COMMENT.search(body):
-            lines[k] = f"{body} {comment}{line[len(body) :]}"
+        room = min(longest - LINE_END - len(body) - len(begin) - len(end) - 1, LONGEST_COMMENT)
+        if body and not body.startswith(("%", ";$")) and not _NO_COMMENT.search(body) and room >= LEAST_COMMENT:
+            lines[k] = f"{body} {begin}{plain[:room].rstrip()}{end}{line[len(body) :]}"
             break
     return "\n".join(lines)

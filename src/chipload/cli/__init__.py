@@ -16,6 +16,7 @@ from typing import NoReturn
 from chipload.cli import chatter as chatter
 from chipload.cli import drafts, jobs, mcp, mtconnect, program_filter, programs, results, shipped, sweep, tap, torque  # noqa: F401
 from chipload.cli import learn as learn
+from chipload.cli import learn_wall as learn_wall
 from chipload.cli import next_measurement as next_measurement
 from chipload.cli import opcua as opcua
 from chipload.cli import watch as watch
@@ -28,8 +29,8 @@ __all__ = ["app", "main"]
 #: the commands in the order of the help
 ORDER = (
     "init", "run", "simulate", "check", "watch-folder", "sweep", "convert", "filter", "fit", "spindle", "learn",
-    "next-measurement", "watch", "mtconnect", "opcua", "tap", "chatter", "cuts", "demo", "example", "examples",
-    "machines", "materials", "cutters", "view", "mcp", "export", "hal",
+    "learn-wall", "next-measurement", "watch", "mtconnect", "opcua", "tap", "chatter", "cuts", "demo", "example",
+    "examples", "machines", "materials", "cutters", "view", "mcp", "export", "hal",
 )  # fmt: skip
 app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callback, "__name__", "")))
 

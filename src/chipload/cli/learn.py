@@ -62,6 +62,12 @@ def learn(
             "--worth/--no-worth", help="run the next job with the material before and after, and compare the two"
         ),
     ] = True,
+    worn: Annotated[
+        bool,
+        typer.Option(
+            "--worn/--sharp", help="Kte of the edge as it is after the logs, for a tool that stays; default: sharp"
+        ),
+    ] = False,
     columns: LogColumns = None,
     overrides: Sets = None,
     debug: Debug = False,
@@ -108,7 +114,7 @@ def learn(
         if signal.kind is SignalKind.POWER:
             spread = number_text(100.0 * signal.gain_error, 2)
             show(f"efficiency of the spindle: {number_text(1.0 / signal.gain)} +- {spread} %")
-        found, aligned = learn_from_logs(read, predicted, signal, prior, lag, name, hashes)
+        found, aligned = learn_from_logs(read, predicted, signal, prior, lag, name, hashes, worn=worn)
         for one in aligned:
             stated_line = read[one.name].line is not None
             clock = (

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from chipload.control.log_alignment import AlignedLog, PredictedTorque, align_log
 from chipload.control.log_blocks import LogBlocks, blocks_of
 from chipload.control.logs import SpindleLog
-from chipload.cutting.learned import LearnedRecord, LogEvidence
+from chipload.cutting.learned import GainKnowledge, LearnedRecord, LogEvidence
 from chipload.cutting.material import Material
 from chipload.errors import Finding, InputError, Severity
 from chipload.lazy import scipy
@@ -146,6 +146,7 @@ class LearnedMaterial:
     ----------
     material, prior : after and before
     wear : tool number -> growth of Kte an hour of cutting, relative, and its standard deviation
+    gain : what the logs tell of the gain of the signal
     fit_error : log -> signal of its cut over what the new coefficients predict, less 1
     blocks : log -> (used, left out)
     findings : what contradicts the model, by line
@@ -154,6 +155,7 @@ class LearnedMaterial:
     material: Material
     prior: Material
     wear: dict[int, tuple[float, float]]
+    gain: GainKnowledge
     fit_error: dict[str, float]
     blocks: dict[str, tuple[int, int]]
     findings: tuple[Finding, ...]
@@ -193,6 +195,7 @@ class _SpindleModel:
         typical = max(float(np.abs(np.concatenate([log.signal for log in logs])).max()), np.finfo(np.float64).tiny)
         self.mean = np.zeros(self.size)
         self.mean[:3] = 1.0
+        gain = _known_gain(prior, signal)
         deviation = np.full(self.size, 10.0 * typical)
         deviation[2] = max(signal.gain_error, 1e-6)
         deviation[self.wear], deviation[self.error] = 1.0 / WEAR_SCALE_S, TORQUE_ERROR
@@ -201,6 +204,9 @@ class _SpindleModel:
         covariance = np.diag(deviation**2)
         # a coefficient of 0, as Kte with a size effect, stays
         covariance[:2, :2] = share + np.diag(np.where(np.diagonal(share) > 0.0, 0.0, 1e-12))
+        if gain is not None:
+            self.mean[2], covariance[2, 2] = gain.ratio, gain.deviation**2
+            covariance[2, :2] = covariance[:2, 2] = gain.with_ktc, gain.with_kte
         self.root = np.linalg.inv(np.linalg.cholesky(covariance))
 
     def predict(self, x: Floats, k: int) -> Floats:
@@ -224,8 +230,26 @@ class _SpindleModel:
         return x
 
 
+def _known_gain(prior: Material, signal: Signal) -> GainKnowledge | None:
+    """Return what the logs of the prior tell of the gain; None: it was learned with no or another gain.
+
+    An error of the gain is common to all logs of a spindle. It does not become smaller by learning again, as that of a
+    gain which were drawn anew with each log would.
+    """
+    gain = prior.learned.gain if prior.learned is not None else None
+    if gain is None or gain.signal != signal.kind.value:
+        return None
+    same = math.isclose(gain.stated, signal.gain, rel_tol=1e-6)
+    return gain if same and math.isclose(gain.stated_deviation, signal.gain_error, rel_tol=1e-6, abs_tol=1e-9) else None
+
+
 def learn_material(
-    logs: Sequence[LogBlocks], signal: Signal, prior: Material, name: str = "", evidence: str = ""
+    logs: Sequence[LogBlocks],
+    signal: Signal,
+    prior: Material,
+    name: str = "",
+    evidence: str = "",
+    worn_s: float | None = None,
 ) -> LearnedMaterial:
     """Return the material after logs of programs that it was cut with.
 
@@ -236,12 +260,13 @@ def learn_material(
     prior : with a spread or a covariance
     name : of the new material; empty: that of the prior with ``-learned``
     evidence : which logs, for the source of the material
+    worn_s : time for which the tool has cut after the logs [s]: Kte is that of its edge then; None: of a sharp edge
 
     Raises
     ------
     InputError
-        The prior states no spread, no block is in the cut, the unit of the signal is wrong, or logs contradict one
-        another.
+        The prior states no spread, ``worn_s`` is stated and there are several tools, no block is in the cut, the unit
+        of the signal is wrong, or logs contradict one another.
     """
     logs = [log for log in logs if len(log.time)]
     if not any((log.cutting > 0.0).any() for log in logs):
@@ -289,11 +314,33 @@ def learn_material(
             )
             findings.append(Finding("log-wear", 0, text, Severity.NOTE))
     counts = [(int(own.sum()), int((~own).sum())) for own in kept]
+    ratio, shares = _edge_after(model, x, covariance, worn_s)
+    material = _material_after(prior, ratio[:2], shares[:2, :2], name, evidence)
+    across = [float(shares[2, k] / ratio[k]) if ratio[k] else 0.0 for k in range(2)]
+    gain = GainKnowledge(
+        signal.kind.value, signal.gain, signal.gain_error, float(ratio[2]), math.sqrt(shares[2, 2]), *across
+    )
     return LearnedMaterial(
-        _material_after(prior, x[:2], covariance[:2, :2], name, evidence), prior, wear,
+        material, prior, wear, gain,
         {log.name: _fit_error(model, x, k, kept[k]) for k, log in enumerate(logs)},
         {log.name: count for log, count in zip(logs, counts, strict=True)}, tuple(findings),
     )  # fmt: skip
+
+
+def _edge_after(model: _SpindleModel, x: Floats, covariance: Floats, worn_s: float | None) -> tuple[Floats, Floats]:
+    """Return x_c, x_e and the gain with their covariance (3, 3), x_e of the edge after it has cut for ``worn_s``."""
+    if worn_s is None:
+        return x[:3], covariance[:3, :3]
+    if len(model.tools) > 1:
+        raise InputError(
+            f"edge: the logs have tools {', '.join(map(str, model.tools))}: a material has one edge: learn a sharp "
+            "one, or log the tools apart"
+        )
+    d = model.wear.start
+    change = np.zeros((3, len(x)))
+    change[[0, 1, 2], [0, 1, 2]] = 1.0, 1.0 + x[d] * worn_s, 1.0
+    change[1, d] = x[1] * worn_s
+    return np.array([x[0], x[1] * (1.0 + x[d] * worn_s), x[2]]), change @ covariance @ change.T
 
 
 def share_text(share: float) -> str:
@@ -339,6 +386,8 @@ def learn_from_logs(
     sensor_lag: float = 0.0,
     name: str = "",
     hashes: Mapping[str, str] = MappingProxyType({}),
+    *,
+    worn: bool = False,
 ) -> tuple[LearnedMaterial, list[AlignedLog]]:
     """Align logs of one program with its simulation and learn from them.
 
@@ -349,6 +398,7 @@ def learn_from_logs(
     signal, prior, name : as :func:`learn_material`
     sensor_lag : time constant of the sensor [s]
     hashes : log -> SHA-256 of its bytes, for the record of the material
+    worn : Kte is that of the edge after the last log, with which the next program is cut; else of a sharp edge
 
     Raises
     ------
@@ -357,17 +407,18 @@ def learn_from_logs(
         prior was learned from it.
     """
     refuse_known_logs(prior, hashes)
-    aligned, blocks, before = [], [], 0.0
+    aligned: list[AlignedLog] = []
+    blocks, cut = [], predicted.cut_seconds
     for key, log in logs.items():
         columns = {SignalKind.POWER: log.power, SignalKind.CURRENT: log.current, SignalKind.TORQUE: log.torque}
         values = columns[signal.kind]
         if values is None:
             raise InputError(f"{key}: no column of {signal.kind}, which the other logs have: learn from them apart")
         aligned.append(align_log(key, log, values, predicted, sensor_lag))
+        before = {tool: len(blocks) * seconds for tool, seconds in cut.items()}
         blocks.append(blocks_of(aligned[-1], predicted, before, sensor_lag))
-        before += predicted.cut_seconds
     evidence = ", ".join(f"{key} (sha256 {hashes[key][:16]})" if key in hashes else key for key in logs)
-    found = learn_material(blocks, signal, prior, name, evidence)
+    found = learn_material(blocks, signal, prior, name, evidence, len(blocks) * max(cut.values()) if worn else None)
     material = replace(found.material, learned=_record(found, aligned, hashes))
     gaps = tuple(f for one in aligned for f in one.findings)
     return replace(found, material=material, findings=(*gaps, *found.findings)), aligned
@@ -402,9 +453,9 @@ def _record(found: LearnedMaterial, aligned: Iterable[AlignedLog], hashes: Mappi
         rows = (int(inside[0]) + 1, int(inside[-1]) + 1)
         own.append(LogEvidence(log.name, hashes.get(log.name, ""), rows, *found.blocks[log.name]))
     if prior.learned is not None:
-        return replace(prior.learned, logs=(*prior.learned.logs, *own), worth=())
+        return replace(prior.learned, logs=(*prior.learned.logs, *own), worth=(), gain=found.gain)
     before = found.deviations[0]
-    return LearnedRecord(prior.name, (prior.Ktc, before[0]), (prior.Kte, before[1]), tuple(own))
+    return LearnedRecord(prior.name, (prior.Ktc, before[0]), (prior.Kte, before[1]), tuple(own), gain=found.gain)
 
 
 def _check_unit(log: LogBlocks, signal: Signal) -> None:

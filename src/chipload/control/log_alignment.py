@@ -69,9 +69,10 @@ class PredictedTorque:
             raise InputError("history.time: must rise")
 
     @property
-    def cut_seconds(self) -> float:
-        """Time in the cut [s]."""
-        return float(np.diff(self.time, prepend=0.0)[self.cutting + self.edge > 0.0].sum())
+    def cut_seconds(self) -> dict[int, float]:
+        """Time in the cut of each tool [s]."""
+        seconds = np.where(self.cutting + self.edge > 0.0, np.diff(self.time, prepend=0.0), 0.0)
+        return {int(tool): float(seconds[self.tool == tool].sum()) for tool in np.unique(self.tool)}
 
 
 @dataclass(frozen=True, eq=False)

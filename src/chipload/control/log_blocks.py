@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,8 @@ Ints = NDArray[np.int64]
 
 #: blocks of a log at most, samples of one at least, and how often the time constant of the sensor it is long at least
 MOST_BLOCKS, LEAST_SAMPLES, BLOCK_LAGS = 240, 3, 4.0
+#: time constant of a sensor that is not stated [s]: drives filter their power and current by 0.02 to 0.1 s
+SENSOR_LAG_S = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +48,17 @@ class LogBlocks:
 
 
 def blocks_of(
-    aligned: AlignedLog, predicted: PredictedTorque, before: float = 0.0, sensor_lag: float = 0.0
+    aligned: AlignedLog,
+    predicted: PredictedTorque,
+    before: Mapping[int, float] = MappingProxyType({}),
+    sensor_lag: float = 0.0,
 ) -> LogBlocks:
     """Return the means of a log over blocks of equal time, long against the sensor.
 
     Parameters
     ----------
-    before : seconds for which each tool has cut before this log [s]
+    before : tool -> time for which it has cut before this log [s]; none: it was sharp
+    sensor_lag : time constant of the sensor [s]; 0: not known, SENSOR_LAG_S
     """
     time, inside = aligned.time, aligned.row >= 0
     row = np.maximum(aligned.row, 0)
@@ -59,9 +67,10 @@ def blocks_of(
     cut = np.zeros(len(load))
     for number in np.unique(predicted.tool):
         own = predicted.tool == number
-        cut[own] = np.cumsum(np.where(load > 0.0, predicted.time - start, 0.0)[own])
+        cut[own] = before.get(int(number), 0.0) + np.cumsum(np.where(load > 0.0, predicted.time - start, 0.0)[own])
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
-    length = max((time[-1] - time[0]) / MOST_BLOCKS, LEAST_SAMPLES * step, BLOCK_LAGS * sensor_lag)
+    lag = sensor_lag if sensor_lag > 0.0 else SENSOR_LAG_S
+    length = max((time[-1] - time[0]) / MOST_BLOCKS, LEAST_SAMPLES * step, BLOCK_LAGS * lag)
     place = ((time - time[0]) / length).astype(np.int64)
     n = int(place[-1]) + 1
     # before and after the program the speed of the spindle is not known
@@ -71,7 +80,7 @@ def blocks_of(
     columns = {
         "signal": aligned.signal, "speed": speed, "cutting": np.where(inside, predicted.cutting[row], 0.0),
         "edge": np.where(inside, predicted.edge[row], 0.0), "time": time,
-        "edge_time": np.where(inside, predicted.edge[row] * (before + cut[row]), 0.0),
+        "edge_time": np.where(inside, predicted.edge[row] * cut[row], 0.0),
     }  # fmt: skip
     count = np.bincount(place[kept], minlength=n)
     means = {
@@ -81,7 +90,7 @@ def blocks_of(
     jumps = np.zeros(n)
     change = np.abs(np.diff(torque, prepend=torque[:1]))
     np.add.at(jumps, place[kept], change[kept])
-    late = max(sensor_lag, step) / length
+    late = max(lag, step) / length
     middle = np.array([int(np.median(np.flatnonzero(place == k))) if c else 0 for k, c in enumerate(count)])
     full = (count >= max(LEAST_SAMPLES, int(0.5 * length / step))) & (count > 0)
     whole = {key: values[full] for key, values in means.items()}

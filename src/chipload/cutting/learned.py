@@ -83,6 +83,27 @@ class KnowledgeWorth:
 
 
 @dataclass(frozen=True)
+class GainKnowledge:
+    """What logs tell of the gain of the spindle's signal; coefficients learned with it are off where it is.
+
+    Parameters
+    ----------
+    signal : ``power``, ``current`` or ``torque``
+    stated, stated_deviation : gain, as the signal is defined, and its relative standard deviation before the first log
+    ratio, deviation : gain over the stated one after the logs, and the standard deviation of that
+    with_ktc, with_kte : its covariance with Ktc and Kte over the learned ones
+    """
+
+    signal: str
+    stated: float
+    stated_deviation: float
+    ratio: float
+    deviation: float
+    with_ktc: float
+    with_kte: float
+
+
+@dataclass(frozen=True)
 class LearnedRecord:
     """How a material was learned.
 
@@ -92,6 +113,7 @@ class LearnedRecord:
     ktc, kte : (coefficient before [MPa, N/mm], its relative standard deviation)
     logs : in the order in which they ran
     worth : of the knowledge, one a job that was run with both materials
+    gain : of the signal of the logs; None: a record of an earlier version
     """
 
     prior: str
@@ -99,6 +121,7 @@ class LearnedRecord:
     kte: tuple[float, float]
     logs: tuple[LogEvidence, ...]
     worth: tuple[KnowledgeWorth, ...] = ()
+    gain: GainKnowledge | None = None
 
     @property
     def logs_text(self) -> str:
@@ -120,6 +143,8 @@ def learned_text(record: LearnedRecord) -> str:
     for name, keys in _BEFORE.items():
         head |= dict(zip(keys, getattr(record, name), strict=True))
     out = ["\n[learned]\n", *_lines(head)]
+    if record.gain is not None:
+        out += ["\n[learned.gain]\n", *_lines({f.name: getattr(record.gain, f.name) for f in fields(GainKnowledge)})]
     for title, rows in (("log", record.logs), ("worth", record.worth)):
         for row in rows:
             values = {f.name: getattr(row, f.name) for f in fields(row)}
@@ -140,14 +165,22 @@ def learned_of(label: str, table: Any) -> LearnedRecord:
         A key is unknown, missing, or not of its kind.
     """
     label = f"{label}: learned"
-    known = ("prior", *(key for keys in _BEFORE.values() for key in keys), "log", "worth")
-    _check_keys(label, table, known, optional=("worth",))
+    known = ("prior", *(key for keys in _BEFORE.values() for key in keys), "log", "worth", "gain")
+    _check_keys(label, table, known, optional=("worth", "gain"))
     pairs = {name: (_number(label, table, a), _number(label, table, b)) for name, (a, b) in _BEFORE.items()}
     return LearnedRecord(
         _text(label, table, "prior"), pairs["ktc"], pairs["kte"],
         tuple(_log_of(f"{label}.log.{k}", row) for k, row in enumerate(_rows(label, table, "log"))),
         tuple(_worth_of(f"{label}.worth.{k}", row) for k, row in enumerate(_rows(label, table, "worth"))),
+        _gain_of(f"{label}.gain", table["gain"]) if "gain" in table else None,
     )  # fmt: skip
+
+
+def _gain_of(label: str, row: Any) -> GainKnowledge:
+    _check_keys(label, row, tuple(f.name for f in fields(GainKnowledge)))
+    numbers = {key: _number(label, row, key) for key in ("stated", "stated_deviation", "ratio", "deviation")}
+    with_ktc, with_kte = (_pair(label, {"pair": [row[key], 0.0]}, "pair")[0] for key in ("with_ktc", "with_kte"))
+    return GainKnowledge(_text(label, row, "signal"), **numbers, with_ktc=with_ktc, with_kte=with_kte)
 
 
 def _log_of(label: str, row: Any) -> LogEvidence:

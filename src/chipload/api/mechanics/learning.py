@@ -77,6 +77,7 @@ def learn(
     efficiency: float | None = None,
     efficiency_error: float | None = None,
     name: str = "",
+    worn: bool = False,
 ) -> LearnedMaterial:
     """Learn the tangential coefficients of a material from logs of a program that was simulated.
 
@@ -90,6 +91,7 @@ def learn(
     efficiency : power of the cut over the logged power, above 0 to 1; None: 0.8
     efficiency_error : its relative standard deviation, from 0 to below 1; None: 0.1, or 0.05 of a stated efficiency
     name : of the new material; empty: that of the old one with ``-learned``
+    worn : Kte of the edge as it is after the logs, for a tool that stays; else of a sharp one
 
     Returns
     -------
@@ -126,7 +128,7 @@ def learn(
     if not logs:
         raise InputError("logs: none is given")
     signal = signal_of_logs(logs.values(), efficiency, efficiency_error)
-    return learn_from_logs(logs, torque_of_result(result, "result"), signal, material, 0.0, name)[0]
+    return learn_from_logs(logs, torque_of_result(result, "result"), signal, material, 0.0, name, worn=worn)[0]
 
 
 def torque_of_result(result: Result, name: str) -> PredictedTorque:
