@@ -3,9 +3,11 @@
 Each cell has coefficients, an efficiency and a wear of its own, and logs with their own clock, idle power of the day,
 noise and error of the simulated torque. For Ktc, Kte and the wear: the share of 95 % intervals that hold the truth, and
 whether the ranks of the truths in the posteriors are uniform (test of Kolmogorov and Smirnov). Then the error of the
-torque of a program that was not used, and the band that is left of the prior's.
+torque of a program that was not used, the same as the spindle shows it (with its own efficiency, which the error of the
+torque contains), and the band that is left of the prior's. An efficiency is known to --efficiency-error; what no log
+can tell is the error of the torque at 95 % by that alone, 1.96 / sqrt(1 / e^2 + 1 / 0.25^2).
 
-    python benchmarks/learning.py [--cells 500] [--logs 5]
+    python benchmarks/learning.py [--cells 500] [--logs 5] [--efficiency-error 0.05]
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +23,7 @@ from scipy.stats import kstest, norm
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+import synthetic_cell
 from chipload.control.learning import learn_material
 from chipload.errors import InputError
 from synthetic_cell import PRIOR, cell, closed_form_program
@@ -33,9 +37,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cells", type=int, default=500)
     parser.add_argument("--logs", type=int, default=5)
+    parser.add_argument("--efficiency-error", type=float, default=synthetic_cell.GAIN_ERROR)
     given = parser.parse_args()
     begin = time.process_time()
-    ranks, error, left, refused = [], [], [], 0
+    synthetic_cell.GAIN_ERROR = given.efficiency_error
+    synthetic_cell.SIGNAL = replace(synthetic_cell.SIGNAL, gain_error=given.efficiency_error)
+    ranks, error, shown, left, refused = [], [], [], [], 0
     for seed in range(given.cells):
         try:
             logs, signal, truth = cell(1000 + seed, given.logs)
@@ -58,6 +65,7 @@ def main() -> int:
         ratio = (found.material.Ktc / PRIOR.Ktc, found.material.Kte / PRIOR.Kte)
         guess = (ratio[0] * program.cutting + ratio[1] * program.edge)[is_cut].mean()
         error.append(abs(guess / real - 1.0))
+        shown.append(abs(guess * found.gain.ratio / (real * truth.gain) - 1.0))
         share = np.array([program.cutting[is_cut].mean(), program.edge[is_cut].mean()])
         before, after = (np.sqrt(share @ m @ share) for m in map(shares_of_prior, (PRIOR, found.material)))
         left.append(after / guess / (before / share.sum()))
@@ -74,6 +82,10 @@ def main() -> int:
         )
     print(f"torque of a program that was not used: error {100.0 * np.median(error):.2g} % (median), "
           f"{100.0 * np.quantile(error, 0.95):.2g} % (95 of 100)")  # fmt: skip
+    print(f"the same as the spindle shows it: {100.0 * np.median(shown):.2g} % (median), "
+          f"{100.0 * np.quantile(shown, 0.95):.2g} % (95 of 100)")  # fmt: skip
+    e = given.efficiency_error
+    print(f"of the torque no log can tell {196.0 / np.hypot(1.0 / e, 4.0):.2g} % (95 of 100), as efficiency")
     print(f"band of that torque: {np.median(left):.2g} of the prior's (median), {np.max(left):.2g} at most")
     return int(bad)
 

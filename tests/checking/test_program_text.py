@@ -29,7 +29,7 @@ def test_a_long_reason_leaves_a_line_that_is_read(dialect: str) -> None:
 
 
 def test_a_line_without_room_leaves_it_to_the_next() -> None:
-    text = program_text(changed("(" + "a" * 220 + ")\nG21\nM2\n", "linuxcnc"), REASON)
+    text = program_text(changed("(" + "a" * 240 + ")\nG21\nM2\n", "linuxcnc"), REASON)
     assert [len(line) <= 252 for line in text.split("\n")] == [True] * 4
     assert text.split("\n")[1].startswith("G21 (NOT VERIFIED")
 

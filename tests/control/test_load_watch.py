@@ -60,6 +60,8 @@ def test_faults_are_found_where_they_are(fault: str) -> None:
         if own is not None:
             begin = float(one.time[own][0])
             assert begin < times[0] < begin + 8.0
+            if fault == "watch-air":
+                assert "missing stock, or it broke before" in found[0].text
             # nothing else is said of another place
             assert {f.line for f in found} == {int(one.line[own][0])}
         hits += 1

@@ -196,8 +196,8 @@ class LoadWatch:
         # time, value, place, override
         self._block: list[tuple[float, float, float, float]] = []
         self._blocks, self._told = 0, {"none": 0, "more": 0, "metal": 0}
-        # blocks with which the cut, and the line, began
-        self._cut_since = self._line_since = 0
+        # blocks with which the line began, and that of the last line in which the tool was seen to cut
+        self._line_since, self._cut_in = 0, -1
         self._begin: float | None = None
         self.seconds = self.cut_seconds = self.judged_seconds = 0.0
         self.finished = self._is_last = False
@@ -282,8 +282,7 @@ class LoadWatch:
         idle = self._idle.setdefault(round(float(self._program.speed[row])), _Mean())
         is_air = not parts.any()
         self.cut_seconds += 0.0 if is_air else seconds
-        if is_air:
-            self._cut_since = self._blocks
+        self._cut_in = -1 if is_air else self._cut_in
         if idle.count < AIR_BLOCKS:
             if is_air and misfit == 0.0:
                 idle.add(value, IDLE_MEMORY)
@@ -329,6 +328,8 @@ class LoadWatch:
         if none.sum > 0.0 or out:
             # what cuts nothing tells nothing of the tool
             return out
+        # the first block of a line holds the end of the one before
+        self._cut_in = self._line_since if self._blocks > self._line_since + 1 else self._cut_in
         if tool.blocks < LEARN_BLOCKS:
             tool.top, tool.bottom = tool.top + y, tool.bottom + float(parts.sum())
             if tool.blocks + 1 == TOOL_BLOCKS:
@@ -357,9 +358,7 @@ class LoadWatch:
         return [Finding("watch-tool", line, f"{self._at(time)}: {text}", Severity.UNPROVEN)]
 
     def _missing(self, number: int) -> str:
-        begin = self._tests["none"].begin
-        # in one line, blocks of which were cut
-        if begin - max(self._cut_since, self._line_since) > 2:
+        if self._cut_in == self._line_since:
             return f"tool {number} stopped to cut in the cut: it is broken, or out of its holder"
         return f"tool {number} cuts air where the program cuts material: missing stock, or it broke before"
 

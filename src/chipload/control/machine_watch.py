@@ -101,7 +101,7 @@ def machine_samples(
     """
     beat, due, line = False, clock(), 0
     moved = read = None
-    is_told = False
+    is_lost = False
     while True:
         status = STATUS.index(hold.status)
         seen = machine.exchange(0.0 if hold.is_stopped else 1.0, beat, 0.0, status, 0.0, 0.0)
@@ -112,10 +112,10 @@ def machine_samples(
         if hold.is_finished and seen.time - moved > ENDED_S:
             return
         read = seen.time if read is None or math.isfinite(seen.current) else read
-        if not is_told and seen.time - read > LOST_S:
+        if not is_lost and seen.time - read > LOST_S:
             text = f"no number of the {kind} for {number_text(LOST_S)} s: nothing is watched"
             notice(Finding("watch-signal", line, text, Severity.UNPROVEN))
-            is_told = True
+            is_lost = True
         if math.isfinite(seen.current):
             line = int(seen.line)
             stands = hold.is_stopped or seen.time - moved > STANDS_S

@@ -96,8 +96,8 @@ def _wall_of(label: str, table: MeasuredWallTable, cutter: Cutter) -> MeasuredWa
         )
     arc = math.acos(1.0 - table.radial_depth_mm / cutter.radius)
     first, last = (0.0, arc) if table.milling == "up" else (math.pi - arc, math.pi)
-    front = engagement_of_arcs([first], [last], table.feed_per_tooth_mm, cutter, table.axial_depth_mm)
-    chips = chips_of_teeth(front, cutter)
+    engagement = engagement_of_arcs([first], [last], table.feed_per_tooth_mm, cutter, table.axial_depth_mm)
+    chips = chips_of_teeth(engagement, cutter)
     height = np.array(table.height_mm)
     if not ((height >= 0.0) & (height <= table.axial_depth_mm)).all():
         raise InputError(f"{label}: height_mm: must be from 0 to axial_depth_mm = {table.axial_depth_mm:g}")
