@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -12,8 +13,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
+from chipload.errors import InputError
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, in_memory
 from chipload.result.result import Provenance
 
@@ -45,6 +48,14 @@ def test_what_is_damaged_is_read_where_it_is_not_damaged(name: str, tmp_path: Pa
         path = tmp_path / f"{k}{reader.suffix}"
         path.write_bytes(seed)
         assert reader.read(path) == 0
+
+
+def test_a_history_without_times_is_refused(tmp_path: Path) -> None:
+    reader = fuzz_readers.READERS["parquet"]
+    table = pq.read_table(io.BytesIO(reader.seeds()[0]))
+    pq.write_table(table.drop_columns(["t_s"]), tmp_path / "a.parquet")
+    with pytest.raises(InputError, match=r"no t_s: nothing to show of its motion: open a-result/report\.html$"):
+        reader.read(tmp_path / "a.parquet")
 
 
 def test_a_case_is_the_same_each_time(tmp_path: Path) -> None:

@@ -157,7 +157,7 @@ def open_result(root: Path, name: str) -> PageResult:
     drawn = tuple(f.name for f in schema if f.name not in BELONGS and _drawable(f.type))
     wanted = ["t_s", "s_mm", *PLACE, *AXIS, "line", "tool"]
     table = _table(path, [c for c in wanted if c in schema.names])
-    missing = [c for c in PLACE if c not in table.column_names]
+    missing = [c for c in (*PLACE, "t_s", "s_mm") if c not in table.column_names]
     if missing or table.num_rows == 0 or sum(rows.values()) != table.num_rows:
         why = "no row" if not missing else f"no {missing[0]}"
         raise InputError(f"{name}/{HISTORY}: {why}: nothing to show of its motion: open {name}/report.html")
