@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from chipload.machine.machine import machine_named
+from chipload.program.commands import DWELL
 from chipload.program.recognise import recognise
 from chipload.program.reconcile import unit_mm
 from chipload.program.swivel import Swivel
@@ -44,6 +45,46 @@ def test_the_level_of_cycles_of_an_okuma(back, height):
     assert at[at[:, 2] == -7.0].tolist() == [[5, 5, -7], [9, 5, -7]]
     assert at[at[:, 2] == -2.0][:, :2].tolist() == [[5, 5], [9, 5]]
     assert at[-1].tolist() == [9, 5, height]
+
+
+def test_user_tasks_of_an_okuma():
+    """Variables, named blocks, calls with arguments and repeats; points by hand."""
+    body = """VC1=12.5
+CALL O200 Q2 DEPTH=-3
+IF [VC1 GT 5] NEND
+G1 X=99 F100.
+NEND G0 X=VC1*2 Z[VC1+0.5]
+G1X=-VC1Y=VC1 F=VC1*4
+MODIN OSIDE
+G0 X0. Y0.
+MODOUT
+M2
+O200
+G1 Z=DEPTH F200.
+X=VC1
+VC1=VC1+1
+RTS
+OSIDE
+G91 G1 Z-1.
+G90
+RTS"""
+    commands, findings = read(body, "okuma", head=OKUMA)
+    assert findings == []
+    assert ends(commands).tolist() == [
+        [0, 0, 10], [0, 0, -3], [12.5, 0, -3], [12.5, 0, -3], [13.5, 0, -3], [29, 0, 15], [-14.5, 14.5, 15],
+        [0, 0, 15], [0, 0, 14],
+    ]  # fmt: skip
+    assert commands.feed[-3] == pytest.approx(58.0 / 60.0)
+
+
+def test_a_tap_goes_out_at_its_feed_to_r_and_a_brother_keeps_the_feed_of_cuts():
+    commands, findings = read("G98 G84 X10. Y0. Z-12. R5. F500.\nG80", "fanuc")
+    assert findings == []
+    cuts = commands.motion != DWELL
+    assert commands.position[cuts, 2][-4:].tolist() == [5.0, -12.0, 5.0, 10.0]
+    assert (commands.feed[cuts][-4:] * 60.0).tolist() == pytest.approx([0.0, 500.0, 500.0, 0.0])
+    commands, findings = read("G1 X1. F80.\nG77 X10. Y10. Z-12. R3. I1. S500\nG80\nG1 X30.", "brother")
+    assert (findings, commands.feed[-1] * 60.0) == ([], pytest.approx(80.0))
 
 
 def test_work_offset_and_length_of_an_okuma():

@@ -102,3 +102,13 @@ def test_a_subprogram_in_a_file_beside_the_text(tmp_path):
     )
     assert ends(commands)[-1][:2].tolist() == [10, 0]
     assert [f.line for f in findings if f.code == "nc-call"] == [6]
+
+
+def test_tangent_arcs_go_on_in_the_direction_before_them():
+    """CT: a quarter about (20, 10), a half about it; then straight on, modal to an arc about (-5, 0)."""
+    commands, findings = si("G1 X20 Y0\nX20.5\nX20\nG1 X10\nX20\nCT X30 Y10\nX10\nY-5\nG1 X0\nCT X-5 Y-5\nX-10 Y0")
+    assert findings == []
+    arcs = np.flatnonzero(commands.motion == ARC)
+    assert commands.centre[arcs, :2].round(9).tolist() == [[20, 10], [20, 10], [-5, 0]]
+    assert ends(commands)[-1].tolist() == [-10, 0, 10]
+    assert arc_angles(commands)[:2] == pytest.approx([90, 180])

@@ -1,8 +1,11 @@
 """Stock that a program states: WORKPIECE of a Sinumerik, BLK FORM of a Heidenhain. Oracle: corners by hand."""
 
+from pathlib import Path
+
 import pytest
 
 from chipload.jobs.drafts.comments import read_header
+from chipload.jobs.drafts.program import draft_program
 
 
 @pytest.mark.parametrize(
@@ -32,3 +35,15 @@ def test_inches():
     stock = read_header('WORKPIECE(,"",,"BOX",112,0,-1,,0,0,4,2)', mm=25.4).stock
     assert stock is not None
     assert stock[0][1] == pytest.approx((101.6, 50.8, 0.0))
+
+
+def test_a_tool_whose_cycle_is_left_out_has_its_cutter(tmp_path: Path):
+    """It cuts, though not in what is read: the job names it, and what it does is unproven."""
+    path = tmp_path / "part.mpf"
+    head = "G71 G90 G17 G94 G54\n"
+    path.write_text(
+        f"{head}T1\nM6\nS900 M3\nG0 X0 Y0 Z9\nG1 Z-1 F90\nX9\nG0 Z9\nT2\nM6\nS900 M3\nG0 X50 Y50 Z9\n"
+        'CYCLE72("CONTOUR",20,0,2,-10)\nG0 Z50\nT3\nM6\nG0 X0\nM30\n'
+    )
+    draft = draft_program(path, tmp_path)
+    assert [{e.key: e.value for e in t.entries}["number"] for t in draft.tables if t.name == "cutter"] == [1, 2]

@@ -100,6 +100,7 @@ def _rules(control: Control) -> list[tuple[str, str]]:
             ("cycles return to", "where they began (G98)" if modal.old_level_at_start else "R (G99)"),
             ("repeats of a cycle", cycles_of.repeat_letter.upper()),
             ("R and Z of a cycle where G90 and G91 change", "keep places" if cycles_of.keeps_places else "keep values"),
+            ("G74, G84, G89 go out at their feed", f"to {'R, then at rapid' if cycles_of.feeds_to_r else 'the level'}"),
             ("P of a cycle with a dwell", "may be missing" if cycles_of.dwell_optional else "must be there"),
         ]
     if control.macros.system_variables:
@@ -168,6 +169,10 @@ def _blocks(control: Control, family: bool = False) -> list[str]:
     rows = [(_GROUPS[name], _codes(set(codes) - other - silent)) for name, codes in GROUPS.items()]
     if family:
         rows += [(what, _codes(set(codes) - other)) for what, codes in _FANUC.items()]
+    if control.text.user_tasks:
+        rows.append(
+            ("user tasks", "VC1 (taken as #501), local names, X=VC1*2, CALL O Q, RTS, MODIN, MODOUT, IF [ ] N, GOTO N")
+        )
     rows.append(("M codes", " ".join(f"M{m}" for m in sorted(m for codes in M_GROUPS.values() for m in codes))))
     out = ["## Codes that are read", "", *_table(("what", "codes"), [row for row in rows if row[1]])]
     if changed:
@@ -198,7 +203,7 @@ def _sinumerik(control: Control) -> list[str]:
         ("G codes", _codes(codes)),
         ("cycles", " ".join((*NAMED_CYCLES, "CYCLE800", "MCALL"))),
         ("coordinates", " ".join((*PLACED, "MIRROR", "AMIRROR", "SCALE", "ASCALE", "TRAORI", "TRAFOOF"))),
-        ("points and arcs", f"{_codes(10 * g for g in POLES)} {' '.join(sorted(POINT_WORDS))} CR TURN CIP"),
+        ("points and arcs", f"{_codes(10 * g for g in POLES)} {' '.join(sorted(POINT_WORDS))} CR TURN CIP CT"),
         ("patterns of holes", " ".join(PATTERNS)),
         ("subprograms", "L100 P3, NAME P2, NAME(1, 2), CALL, EXTCALL: %_N_NAME_SPF or PROC in the text, NAME.SPF"),
         ("corners", " ".join(CORNERS)),
@@ -226,6 +231,11 @@ def _heidenhain(control: Control) -> list[str]:
         ("planes", "PLANE SPATIAL, EULER, VECTOR, RELATIV, AXIAL, RESET with TURN, MOVE, STAY; FUNCTION TCPM"),
         ("cycles", " ".join(map(str, sorted(own)))),
         ("subprograms, parameters", "LBL, CALL LBL, REP, CALL PGM, Q, QL, QR, formulas, FN"),
+        (
+            "DIN/ISO (%NAME G71)",
+            "G00 to G03, G05 to G07, G10 to G13, G15, G16, G17 to G20, G24, G25, G28 to G31, G38, G40 to G42, G51, "
+            "G54, G70 to G73, G79, G80, G83, G90, G91, G98, G99, G200 on as their cycles, I J K, L1,0, D00 to D13",
+        ),
         ("M functions", " ".join(f"M{m}" for m in switches.KNOWN)),
     ]
     left = sorted(q_cycles.LEFT_OUT - own)

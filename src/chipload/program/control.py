@@ -99,6 +99,7 @@ class CycleRules:
     dwell_optional : P may be missing
     starts_spindle : ``none``, ``tapping``, or ``all``: cycles that start a spindle at rest
     peck_letters : I, J and K of G73 and G83 are pecks that become shorter
+    feeds_to_r : G74, G84 and G89 go at their feed up to R, then at rapid to the level of G98; else at feed to there
     keeps_places : a cycle keeps the places of R and its bottom where G90 and G91 change; else their values
     """
 
@@ -107,6 +108,7 @@ class CycleRules:
     dwell_optional: bool
     starts_spindle: str
     peck_letters: bool
+    feeds_to_r: bool
     keeps_places: bool
 
 
@@ -193,6 +195,7 @@ class TextRules:
     longest_line : characters of a line; 0: no limit
     o_words : O begins a number or a statement
     program_number : programs begin with % and an O number
+    user_tasks : statements are those of an Okuma: VC1, CALL O, RTS, IF [ ] N
     unread : codes that are known and not read: what they do
     codes : codes that mean something else: the code that they are read as, ``idle`` or ``unread``
     """
@@ -201,6 +204,7 @@ class TextRules:
     longest_line: int
     o_words: bool
     program_number: bool
+    user_tasks: bool
     unread: Mapping[int, str]
     codes: Mapping[int, str]
 

@@ -34,7 +34,7 @@ TOOL = r"\bT(?:OOL)?\s*(?:NO\.?|NUMBER)?\s*[-:#=]?\s*T?(?P<tool>[0-9]{1,8})\b"
 #: D and the number of an offset: no point, no sign between them, no unit
 _OFFSET = re.compile(r"\bD([0-9]{1,8})\b(?![./]|\s*(?:MM|INCH|IN\b|\"))")
 _LENGTH_OFFSET = re.compile(r"\bH\s*[0-9]+\b")
-_INCH_PROGRAM = re.compile(r"BEGIN PGM[^\n]*\bINCH\b", re.IGNORECASE)
+_INCH_PROGRAM = re.compile(r"BEGIN PGM[^\n]*\bINCH\b|^%[ \t]*[\w-]+[ \t]+G70\b", re.IGNORECASE)
 #: unit words, also without blanks between words; G70 and G71 with other words are cycles and levels
 UNITS = re.compile(r"(?<![A-Z])G\s*0*(20|21|700|710|7[01](?!\s*[IJKLPQZ]))(?![0-9.])", re.IGNORECASE)
 

@@ -169,7 +169,7 @@ def test_sinumerik_tapping():
 
 
 def test_what_sinumerik_programs_ask_for_and_is_not_read_is_left_out():
-    commands, findings = sinumerik("G0 X1\nCT X5 Y5\nX6\nPOCKET4(1,2)\nG1 X7 F60\nM30")
+    commands, findings = sinumerik("G0 X1\nASPLINE X5 Y5\nX6\nPOCKET4(1,2)\nG1 X7 F60\nM30")
     assert commands.position[:, 0].tolist() == [1.0, 7.0]
     assert [f.line for f in findings if f.severity is Severity.UNPROVEN] == [2, 3, 4]
 
@@ -178,7 +178,7 @@ def test_fanuc_rigid_tapping_starts_its_spindle():
     for text in ("S600 M29\nG98 G84 Z-9. R2. F750.", "S600\nG84.2 Z-9. R2. F750."):
         commands, _ = fanuc(f"G0 X0. Y0. Z10.\n{text}\nX5.\nG80\nM30")
         fed = commands.motion == LINE
-        assert commands.position[fed, 2].tolist() == [-9.0, 10.0, -9.0, 10.0]
+        assert commands.position[fed, 2].tolist() == [-9.0, 2.0, -9.0, 2.0]
         assert commands.feed[fed].tolist() == pytest.approx([12.5] * 4)
         assert np.sign(commands.spindle[fed]).tolist() == [1.0, -1.0, 1.0, -1.0]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import cutter_from_table
-from chipload.errors import InputError, Severity, group_findings
+from chipload.errors import Finding, InputError, Severity, group_findings
 from chipload.files import read_regular
 from chipload.jobs.drafts.comments import Box, Header, read_header
 from chipload.jobs.drafts.cutters import cutter_table
@@ -22,6 +22,7 @@ from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.apt.reader import apt_text
 from chipload.program.control import is_cl_data
 from chipload.program.gcode.reader import gcode_text
+from chipload.program.heidenhain.din_iso import conversational
 from chipload.program.lines_of import UNSET, reading_of_lines
 from chipload.program.motions import bounds, lengths
 from chipload.program.program import DWELL, RAPID, Program
@@ -56,6 +57,10 @@ NO_FEED = "the feed is 0 or was never set"
 LISTED = 8
 #: ends of the codes of findings that do not concern the motions
 PLAIN = ("-unused", "-unknown", "-coolant")
+#: findings on blocks that may cut and are not in the program
+LEFT_OUT = frozenset(
+    {"nc-not-read", "nc-call", "nc-unknown-word", "nc-left-out", "heidenhain-cycle", "heidenhain-left-out"}
+)
 _LARGEST = 500_000_000
 #: the first speed of a text, outside its comments
 _SPEED = re.compile(r"(?<![A-Z_<\[])S\s*([0-9]+(?:\.[0-9]*)?)(?![0-9A-Z])", re.IGNORECASE)
@@ -110,7 +115,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     chosen = _read(path, known)
     kind = chosen.dialect or ENDINGS.get(path.suffix.lower())
     apt = kind is not None and is_cl_data(kind)
-    text = known.text if known.text is not None else _text(path, apt)
+    text = conversational(known.text if known.text is not None else _text(path, apt))
     header = read_header(text, apt, unit_mm(text, chosen.reading.unit))
     if any(f.code == "nc-diameter-unknown" for f in chosen.reading.findings):
         chosen = _read(path, known, _cutters(chosen.reading.program, known, header))
@@ -122,7 +127,8 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     first = reading_of_lines(chosen.reading, setups[0], setups[1:]).program if setups else program
     block, stock_entries = _stock(first, known, header)
     cuts = _rows_at_feed(program)
-    numbers = [int(n) for n in np.unique(program.tool[cuts])] if cuts.any() else [int(program.tool[-1])]
+    used = set(np.unique(program.tool[cuts]).tolist()) | _tools_left_out(program, chosen.reading.findings)
+    numbers = sorted(used) or [int(program.tool[-1])]
     deepest = {
         n: block[1][2] - float(program.p_work[cuts & (program.tool == n), 2].min(initial=block[1][2])) for n in numbers
     }
@@ -274,6 +280,14 @@ def _best(
         if best is not None and best[0] == 0:
             break
     return None if best is None else best[1]
+
+
+def _tools_left_out(program: Program, findings: Sequence[Finding]) -> set[int]:
+    """Tools in whose blocks a cycle or a motion is left out: they cut, though not here."""
+    lines = {f.line for f in findings if f.code in LEFT_OUT and f.line >= int(program.line[0])}
+    order = np.argsort(program.line, kind="stable")
+    at = np.searchsorted(program.line[order], sorted(lines), "right") - 1
+    return set(program.tool[order][at].tolist()) - {0}
 
 
 def _rows_at_feed(program: Program) -> np.ndarray:

@@ -119,6 +119,8 @@ class Controller:
         #: level of G71 of an Okuma [units of the text], and whether its cycles go back to it
         self.return_level: float | None = None
         self.returns_to_level = False
+        #: feeds before a tapping cycle that calculates its own (G77 of a Brother); None: there is none
+        self.feed_of_cuts: tuple[float, float] | None = None
         #: Sinumerik: the drilling cycle behind each block (MCALL), its name and its arguments
         self.modal_hole: tuple[str, list[float | None]] | None = None
         #: Sinumerik: the pole, the last polar point, and whether CIP lasts

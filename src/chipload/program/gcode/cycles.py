@@ -39,6 +39,7 @@ class Hole:
     """Numbers of one hole [units of the text, s]; ``sense`` of the spindle: 1, -1 or 0.
 
     ``shorter``: each peck is by that shorter than the one before it, and at least ``least`` where it is.
+    ``out``: height up to which G74, G84 and G89 go at their feed, then at rapid to ``clear``; None: at feed to there.
     ``shift`` [mm] and ``middle`` of G87; ``back`` is RETURN in units of the text.
     """
 
@@ -53,11 +54,13 @@ class Hole:
     back: float = RETURN
     shorter: float = 0.0
     least: float = 0.0
+    out: float | None = None
 
 
 def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
     """The steps from above R, over (a, b), to ``clear``."""
     r, bottom, clear = hole.r, hole.bottom, hole.clear
+    out = clear if hole.out is None else hole.out
     if code in (870, FANUC_BACK_BORING):
         yield from _back_bore(a, b, hole) if code == 870 else _fanuc_back_bore(a, b, hole)
         return
@@ -72,13 +75,17 @@ def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
     if code in (740, 840):
         yield SPIN, a, b, bottom, -hole.sense
         yield DWELL, a, b, bottom, hole.dwell or 0.0
-        yield LINE, a, b, clear, 0.0
-        yield SPIN, a, b, clear, hole.sense
+        yield LINE, a, b, out, 0.0
+        yield SPIN, a, b, out, hole.sense
+        if out != clear:
+            yield RAPID, a, b, clear, 0.0
         return
     if code in NEED_P:
         yield DWELL, a, b, bottom, hole.dwell or 0.0
     if code == 890:
-        yield LINE, a, b, clear, 0.0
+        yield LINE, a, b, out, 0.0
+        if out != clear:
+            yield RAPID, a, b, clear, 0.0
         return
     if code == 850:
         yield LINE, a, b, r, 0.0

@@ -54,11 +54,15 @@ class Drilling:
         self.started = False
 
     def end(self) -> None:
-        """The series of holes ends (G80); a spindle that its cycle has started stops."""
+        """The series of holes ends (G80); a spindle that its cycle has started stops, its own feed ends."""
         self.series = None
         if self.started:
             self.started = False
             self.c.state.sense = 0
+            self.c.changed()
+        if self.c.feed_of_cuts is not None:
+            self.c.state.feed, self.c.state.feed_turning = self.c.feed_of_cuts
+            self.c.feed_of_cuts = None
             self.c.changed()
 
     def _start(self, code: int) -> None:
@@ -224,5 +228,6 @@ class Drilling:
             shift,
             middle,
             cycles.RETURN / scale,
-            *(self.c.pecks if code in cycles.NEED_Q else ()),
+            *(self.c.pecks if code in cycles.NEED_Q else (0.0, 0.0)),
+            out=r if self.c.control.cycles.feeds_to_r else None,
         )

@@ -17,6 +17,7 @@ from dataclasses import replace
 from chipload.errors import InputError
 from chipload.program.gcode import offsets, targets
 from chipload.program.gcode.controller import Controller
+from chipload.program.gcode.cycles import TAPPING
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.mirror import mirror
 from chipload.program.gcode.modal import USER_M, check_codes, code_text, motion_of, motion_of_group_one, unused_letters
@@ -177,6 +178,8 @@ class BlockInterpreter:
                 state.feed = state.feed_turning = 0.0
             c.changed()
         if "f" in words:
+            if not TAPPING.intersection(block.g):
+                c.feed_of_cuts = None
             if words["f"] < 0.0:
                 raise InputError(f"F{words['f']:g}: a feed must be 0 or more")
             if state.feed_mode != 930:

@@ -111,6 +111,8 @@ def _tap(block: Block, code: int, tapping: int, c: Controller) -> None:
     words.pop("l", None)
     if not (pitch > 0.0 and speed > 0.0):
         raise NotReadError(f"{code_text(code)}: I (pitch) or J (threads an inch) and a spindle speed are missing")
+    if c.feed_of_cuts is None:
+        c.feed_of_cuts = c.state.feed, c.state.feed_turning
     words["f"] = pitch * speed
     block.g.append(tapping)
 

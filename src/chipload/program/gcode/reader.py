@@ -25,6 +25,7 @@ from chipload.program.gcode.sinumerik import Sinumerik
 from chipload.program.gcode.source import Source, lines_of, read_source
 from chipload.program.gcode.state import nine
 from chipload.program.gcode.tools import ToolTable
+from chipload.program.gcode.user_tasks import user_tasks
 from chipload.program.swivel import Swivel
 from chipload.progress import Progress, silent
 
@@ -123,7 +124,7 @@ def read_gcode(
         swivel=swivel,
     )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    text = rule.prepare(text)
+    text = rule.prepare(user_tasks(text) if control.text.user_tasks else text)
     rule.begin(controller, text)
     # a Sinumerik has no O-words: ORIWKS and the label OUT: are none
     source = read_source(text, name) if control.text.o_words else Source(name, lines_of(text, name))

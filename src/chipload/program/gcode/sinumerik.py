@@ -14,7 +14,7 @@ Points by a pole or an angle and arcs by three points are in :mod:`~chipload.pro
 of holes in :mod:`~chipload.program.gcode.sinumerik_patterns`, subprograms in
 :mod:`~chipload.program.gcode.sinumerik_calls`, jumps and loops in :mod:`~chipload.program.gcode.sinumerik_flow`. Left
 out, so that the result is unproven: motions in coordinates that change within mirrored or scaled ones, tool vectors (A3
-B3 C3), cycles that are not drilling, curves (CT, splines), values of names that nothing defines. Noted and left out:
+B3 C3), cycles that are not drilling, splines, values of names that nothing defines. Noted and left out:
 what does not concern the path. G331 is read as G33, G332 as G33 with the spindle reversed.
 """
 
@@ -474,6 +474,8 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
         block.m.append(_end_of_program(c, "RET"))
     elif word == "CIP":
         block.circle = True
+    elif word == "CT":
+        block.tangent = True
     elif word in FRAMES:
         block.frame = word
     elif word in JUMPS:

@@ -4,7 +4,7 @@ Notation: in the plane of G17 to G19 with the axes u and v. G110, G111 and G112 
 stands, from the zero, from the last pole; without one the zero is the pole. RP radius [units of the text] and AP angle
 [deg] about it; the one that is missing is that of the block before. ANG [deg] direction of a line from the first axis,
 with one of its coordinates. AR [deg] angle of an arc, with its centre or with its end. CIP goes through the point I1 J1
-K1; CIP lasts until another motion.
+K1, CT goes on in the direction of the motion before it; both last until another motion.
 
 Reference: Siemens, SINUMERIK 840D sl Programming Manual Fundamentals, "Polar coordinates", "Circular interpolation".
 Differs from source: CIP lies in the plane, with no height of its own.
@@ -39,10 +39,11 @@ def place_points(block: Block, c: Controller, values: list[tuple[str, str, float
     """
     memory = c.points
     if {0, 10, 20, 30, 330} & set(block.g):
-        memory.circle = False
-    if block.circle:
-        memory.circle = True
-    if not block.point and block.pole is None and not (memory.circle and block.words.keys() & set("xyz")):
+        memory.circle = memory.tangent = False
+    if block.circle or block.tangent:
+        memory.circle, memory.tangent = block.circle, block.tangent
+    named = block.words.keys() | {letter for letter, _, _ in values}
+    if not block.point and block.pole is None and not ((memory.circle or memory.tangent) and named & set("xyz")):
         return
     plane = next((g for g in reversed(block.g) if g in PLANES), c.state.plane)
     if plane not in PLANES:
@@ -58,7 +59,9 @@ def place_points(block: Block, c: Controller, values: list[tuple[str, str, float
         return
     point = block.point
     motion = next((g for g in reversed(block.g) if g in (0, 10, 20, 30)), c.state.motion)
-    if memory.circle:
+    if memory.tangent:
+        _tangent_arc(block, c, values, here, coordinates, (u, v, iu, iv))
+    elif memory.circle:
         _arc_through_point(block, values, here, coordinates, (u, v, iu, iv))
     elif "RP" in point or "AP" in point:
         radius, angle = memory.polar
@@ -147,6 +150,27 @@ def _arc_by_angle(
             centre = complex(entry[2], centre.imag) if entry[0] == iu else complex(centre.real, entry[2])
     turn = math.radians(angle if motion == COUNTER else -angle)
     _put(block, values, (u, v), centre + (here - centre) * cmath.rect(1.0, turn))
+
+
+def _tangent_arc(
+    block: Block, c: Controller, values: list[tuple[str, str, float]], here: complex, coordinates: dict[str, float],
+    names: tuple[str, str, str, str],
+) -> None:  # fmt: skip
+    """CT: the arc that leaves here in the direction of the motion before it, or a line where its end lies ahead."""
+    u, v, iu, iv = names
+    heading = None
+    if c.state.compensation == 400 and not c.in_corner:
+        heading = c.track.heading("xyz".index(u), "xyz".index(v))
+    if heading is None:
+        raise NotReadError("CT: the direction before it is not known here: its motion is left out")
+    chord = complex(coordinates.get(u, here.real), coordinates.get(v, here.imag)) - here
+    across = (chord / (1j * heading)).real
+    if abs(across) < 1e-9 * max(abs(chord), 1e-9):
+        block.g.append(LINES[1])
+    else:
+        block.g.append(COUNTER if across > 0.0 else CLOCKWISE)
+        _centre(block, (iu, iv), 1j * heading * abs(chord) ** 2 / (2.0 * across))
+    _put(block, values, (u, v), here + chord)
 
 
 def _arc_through_point(

@@ -151,9 +151,10 @@ class PointMemory:
     ----------
     pole : in the axes of the plane [units of the text]
     polar : radius and angle [deg] of the last polar point
-    circle : whether CIP is the motion
+    circle, tangent : whether CIP, or CT, is the motion
     """
 
     pole: complex = 0j
     polar: list[float] = field(default_factory=lambda: [0.0, 0.0])
     circle: bool = False
+    tangent: bool = False

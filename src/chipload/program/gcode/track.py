@@ -7,6 +7,8 @@ columns in pieces, so that a long text does not hold a tuple for each.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -120,6 +122,19 @@ class MotionRows:
         """Add an arc about (first, second) in its plane."""
         self._arcs.append((self.count + len(self.rows), first, second, turns))
         self.rows.append(row)
+
+    def heading(self, first: int, second: int) -> complex | None:
+        """Direction of the last motion in a plane of two of the axes X Y Z, where it ends; None: not known."""
+        rows = self.rows
+        for k in range(len(rows) - 1, 0, -1):
+            to, begin = (complex(rows[i][1 + first], rows[i][1 + second]) for i in (k, k - 1))
+            arc = next((a for a in reversed(self._arcs) if a[0] <= self.count + k), None)
+            if arc is not None and arc[0] == self.count + k:
+                radius = to - complex(arc[1], arc[2])
+                return 1j * math.copysign(1.0, arc[3]) * radius / abs(radius) if abs(radius) > 0.0 else None
+            if abs(to - begin) > 1e-9:
+                return (to - begin) / abs(to - begin)
+        return None
 
     def used_frames(self) -> tuple[Datum, ...]:
         """The datums that rows were made in."""

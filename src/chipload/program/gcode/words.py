@@ -53,7 +53,7 @@ class Block:
     pointless : letters whose numbers are written without a decimal point
     frame : Sinumerik's word that sets the coordinates (TRANS, ROT ...)
     point : Sinumerik's words of a point without coordinates (RP, AP, ANG, AR, I1 ...): how, and the value
-    pole : G110 to G112 of a Sinumerik; ``circle``: CIP
+    pole : G110 to G112 of a Sinumerik; ``circle``: CIP, ``tangent``: CT
     pattern : Sinumerik's pattern of holes, its name and its arguments
     program_call, arguments : name of the subprogram that a Sinumerik calls and how often, and its arguments
     """
@@ -74,6 +74,7 @@ class Block:
     point: dict[str, tuple[str, float]] = field(default_factory=dict)
     pole: int | None = None
     circle: bool = False
+    tangent: bool = False
     pattern: tuple[str, list[float | None]] | None = None
     program_call: tuple[str, int] | None = None
     arguments: list[float | None] = field(default_factory=list)

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 
 from chipload.errors import InputError
 from chipload.program.gcode.feed_words import written_feed
+from chipload.program.heidenhain.din_iso import is_din_iso
 from chipload.program.heidenhain.words import FEED, M_CODE, TURN_FEED
 
 #: comments and texts, in which no word stands
@@ -73,6 +74,8 @@ def with_feeds(text: str, lines: Mapping[int, float]) -> str:
     for line, times in lines.items():
         if not 0.0 < times < math.inf:
             raise InputError(f"line {line}: a feed {times:g} times the old one: must be above 0")
+    if is_din_iso(text):
+        raise InputError("a DIN/ISO program: feeds are changed in conversational programs only: export one")
     out = text.split("\n")
     old, now, letters = math.nan, "", "F"
     unit = stated_in = "minute"

@@ -11,6 +11,7 @@ from pathlib import Path
 from chipload.errors import InputError
 from chipload.files import is_file, read_regular
 from chipload.program.heidenhain import words
+from chipload.program.heidenhain.din_iso import conversational
 from chipload.program.heidenhain.formula import q_number
 from chipload.program.heidenhain.state import ConversationalState
 
@@ -39,7 +40,7 @@ class Text:
 
 def text_of(raw: str) -> Text:
     """The blocks of a program with their labels."""
-    blocks = words.blocks_of(raw)
+    blocks = words.blocks_of(conversational(raw))
     places: dict[str, int] = {}
     for k, block in enumerate(blocks):
         found = words.LABEL.match(block)

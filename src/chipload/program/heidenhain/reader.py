@@ -11,6 +11,8 @@ Notation: a block is a line; X Y Z [mm], A B C [rad].
 | switches (:mod:`~chipload.program.heidenhain.switches`) | TOOL DEF, TOOL CALL, M functions, FUNCTION TCPM |
 | order (:mod:`~chipload.program.heidenhain.flow`) | labels, REP, FN, Q parameters, CALL PGM of a file beside it |
 
+Programs in DIN/ISO are taken as conversational ones (:mod:`~chipload.program.heidenhain.din_iso`).
+
 Everything else in a block is left out, with a finding on its line that leaves the program unproven. A block whose words
 are wrong is refused.
 """
@@ -29,6 +31,7 @@ from chipload.files import read_regular
 from chipload.program.commands import Commands, commands_from_rows
 from chipload.program.heidenhain import motions, switches, words
 from chipload.program.heidenhain.cycles import Cycles, call_positions
+from chipload.program.heidenhain.din_iso import AND, conversational
 from chipload.program.heidenhain.flow import HeidenhainFlow, text_of
 from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.q_cycles import MAX
@@ -128,7 +131,7 @@ def tool_definitions(text: str) -> dict[int, StatedDiameter]:
     """
     mm = unit_mm(text)
     out: dict[int, StatedDiameter] = {}
-    for line, raw in enumerate(text.splitlines(), start=1):
+    for line, raw in enumerate(conversational(text).splitlines(), start=1):
         found = _DEFINED.match(raw.upper())
         if found is not None and float(found[2]) > 0.0:
             diameter = 2.0 * float(found[2]) * mm
@@ -186,7 +189,8 @@ class _Blocks:
             self.s.ended = back is None
             return at if back is None else back
         try:
-            self._carry_out(block)
+            for part in block.split(AND):
+                self._carry_out(part)
         except InputError as err:
             if not (self.lenient or isinstance(err, NotKnownError)):
                 raise
