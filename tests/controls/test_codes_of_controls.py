@@ -139,3 +139,11 @@ def test_dynamic_work_offset_of_a_haas(angles):
     # a table turns the part the other way round: either sign is one of the machine, but both turns must be there
     signs = [(turn_b if s > 0 else turn_b.T) @ (turn_c if t > 0 else turn_c.T) for s in (1, -1) for t in (1, -1)]
     assert any(np.allclose(tilted.matrix, M.T, atol=1e-12) for M in signs)
+
+
+def test_what_ends_nothing_and_words_of_unknown_functions_leave_no_doubt():
+    """The preamble of Mach3, and M298 L of a Brother."""
+    commands, findings = read("G0 G49 G40.1 G17 G80 G50 G90\nG1 X9. F90.", "mach3")
+    assert (findings, ends(commands)[-1].tolist()) == ([], [9, 0, 10])
+    _, found = read("M298 L5\nG1 X9. F90.", "brother")
+    assert found == []

@@ -40,3 +40,12 @@ def test_a_block_that_cannot_be_read_is_a_finding():
     left_out = [f for f in findings if f.severity is Severity.UNPROVEN]
     assert [(f.code, f.line) for f in left_out] == [("heidenhain-left-out", 5)]
     assert commands.position[-1, 0] == 9.0
+
+
+def test_a_line_with_the_normal_of_its_surface_ends_where_it_says():
+    """NX NY NZ are no coordinates; with a tool direction its block is left out."""
+    commands, findings = read("L X+1 Y+2 Z+3 F500", "LN X+4 Y+5 Z+6 NX+0.6 NY+0 NZ+0.8 F500", "LN X+7 NX+0 NY+0 NZ+1")
+    assert [f.code for f in findings if f.severity > Severity.NOTE] == []
+    assert commands.position[:, :3].tolist() == [[1, 2, 3], [4, 5, 6], [7, 5, 6]]
+    _, findings = read("L X+1 Y+2 Z+3 F500", "LN X+4 NX+0 NY+0 NZ+1 TX+0 TY+0 TZ+1", lenient=True)
+    assert [f.line for f in findings if f.severity > Severity.NOTE] == [5]

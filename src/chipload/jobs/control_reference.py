@@ -226,7 +226,7 @@ def _sinumerik(control: Control) -> list[str]:
 def _heidenhain(control: Control) -> list[str]:
     own = {1, 7, 9, 19, 247, 220, 221, *cycles.CHANGES, *q_cycles.CYCLES, *bore_cycles.CYCLES}
     rows = [
-        ("motions", "L LP C CR CT CP CC RND CHF, RL RR R0"),
+        ("motions", "L LN LP C CR CT CP CC RND CHF, RL RR R0"),
         ("approach and departure", "APPR and DEP with LT, LN, CT, LCT"),
         ("planes", "PLANE SPATIAL, EULER, VECTOR, RELATIV, AXIAL, RESET with TURN, MOVE, STAY; FUNCTION TCPM"),
         ("cycles", " ".join(map(str, sorted(own)))),

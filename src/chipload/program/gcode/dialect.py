@@ -28,6 +28,8 @@ KEPT_WORDS = "fst"
 NOTED = 9999
 #: motions that last behind their block
 LASTING = (0, 10, 20, 30)
+#: end of scaling and of a normal direction, which nothing here begins
+ENDS_NOTHING = frozenset({500, 401})
 
 
 class NotReadError(InputError):
@@ -84,12 +86,15 @@ class Dialect:
 
 
 def _other_controllers(block: Block, c: Controller) -> None:
-    """Words of Mach3, GRBL and their posts that LinuxCNC refuses: G70 and G71 as units, K0 of an arc in XY."""
+    """Words of Mach3, GRBL and their posts that LinuxCNC refuses: G70 and G71 as units, G50 and G40.1 that end what is
+    not on, K0 of an arc in XY.
+    """
     units = {700: 200, 710: 210}
     if not has_axes(block):
         for code in [code for code in block.g if code in units]:
             c.once("nc-units", f"{code_text(code)}: taken as {code_text(units[code])}")
             block.g[block.g.index(code)] = units[code]
+        block.g = [code for code in block.g if code not in ENDS_NOTHING]
     arc = next((code for code in block.g if code in (20, 30)), c.state.motion)
     if arc in (20, 30) and c.state.plane == 170 and block.words.get("k") == 0.0:
         c.once("nc-unused-word", "K0: is not a coordinate of the arc's plane: left out")
@@ -146,4 +151,7 @@ def lenient(block: Block, c: Controller, unread: frozenset[int] = UNREAD) -> Blo
     for m in [m for m in block.m if m not in M_GROUP_OF and m not in USER_M]:
         c.refused("nc-unknown-word", f"M{m}: is not known; it is ignored")
         block.m.remove(m)
+        if not block.g and not has_axes(block):
+            # its own words, as in M298 L5
+            block.words = {x: value for x, value in block.words.items() if x not in "lpqre"}
     return block

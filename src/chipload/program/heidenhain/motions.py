@@ -25,6 +25,7 @@ from chipload.program.heidenhain.switches import act_after, act_before, m_codes
 #: an arc may end so much nearer to its pole than it begins, or farther [mm]
 ROUNDED = 0.02
 MOST_TURNS = 10_000
+_NORMAL = re.compile(rf"\bN[XYZ]\s*[-+]?\s*(?:{words.VALUE})")
 _SPAN = re.compile(rf"\bIPA\s*([-+]?)\s*({words.VALUE})")
 
 
@@ -33,6 +34,15 @@ def line(s: ConversationalState, text: str) -> None:
     codes, fast = _read(s, text)
     end, named = s.ends(text)
     _straight(s, text, end, named, codes, fast)
+
+
+def line_with_normal(s: ConversationalState, text: str) -> None:
+    """LN: a straight motion; the normal NX NY NZ of the surface moves only a tool of another radius than planned."""
+    if re.search(r"\bT[XYZ]", text):
+        raise NotKnownError("LN: tool directions by TX TY TZ are not read: output rotary axes")
+    if not any(f.code == "heidenhain-normal" for f in s.findings[-50:]):
+        s.note("heidenhain-normal", "LN: NX NY NZ: the tool is taken as the one that was planned, with DR 0")
+    line(s, _NORMAL.sub(" ", text))
 
 
 def polar_line(s: ConversationalState, text: str) -> None:

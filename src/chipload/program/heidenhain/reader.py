@@ -4,7 +4,7 @@ Notation: a block is a line; X Y Z [mm], A B C [rad].
 
 | subject | blocks |
 |---|---|
-| motions (:mod:`~chipload.program.heidenhain.motions`) | L, LP, CC, C, CR, CT, CP, RND, CHF, RL, RR |
+| motions (:mod:`~chipload.program.heidenhain.motions`) | L, LN, LP, CC, C, CR, CT, CP, RND, CHF, RL, RR |
 | approach (:mod:`~chipload.program.heidenhain.approaches`) | APPR and DEP with LT, LN, CT, LCT |
 | planes (:mod:`~chipload.program.heidenhain.tilted_plane`) | PLANE SPATIAL, EULER, VECTOR, RELATIV, RESET; cycle 19 |
 | cycles (:mod:`~chipload.program.heidenhain.cycles`) | 1, 7, 9, 200 to 209, 220, 221, 240, 262; PATTERN DEF |
@@ -48,6 +48,7 @@ LONGEST_TEXT, MOST_BLOCKS = 100_000_000, 2_000_000
 AHEAD = 20
 _MOTIONS = {
     "L": motions.line,
+    "LN": motions.line_with_normal,
     "LP": motions.polar_line,
     "C": motions.arc,
     "CR": motions.arc_of_radius,
@@ -264,7 +265,7 @@ class _Blocks:
         codes = switches.m_codes(text)
         if 89 in codes:
             self.cycles.modal = True
-        moved = word in ("L", "LP", "C", "CR", "CT", "CP") and words.AXIS.search(text) is not None
+        moved = word in ("L", "LN", "LP", "C", "CR", "CT", "CP") and words.AXIS.search(text) is not None
         if 99 in codes or (self.cycles.modal and moved):
             self.cycles.call()
         if 99 in codes:
