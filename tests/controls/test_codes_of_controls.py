@@ -147,3 +147,12 @@ def test_what_ends_nothing_and_words_of_unknown_functions_leave_no_doubt():
     assert (findings, ends(commands)[-1].tolist()) == ([], [9, 0, 10])
     _, found = read("M298 L5\nG1 X9. F90.", "brother")
     assert found == []
+
+
+def test_a_colon_before_words_numbers_a_block():
+    """NX marks a change of the tool so; alone it is the number of a program. G61.1 ,R of a Mazak is no corner."""
+    commands, findings = read(
+        "(TOOL NAME : EM10)\n:0030 T02 M06\nS900 M3\nG1 X9. F90.", head=":1234\nG21 G17 G90 G94\n"
+    )
+    assert (findings, commands.tool.tolist()) == ([], [2])
+    assert read("G61.1 ,R3\nG1 X9. F90.", "mazak")[1] == []

@@ -48,7 +48,9 @@ if TYPE_CHECKING:
 #: name of a program instead of its number, and a comment that holds another (
 _NAME = re.compile(r"^[ \t]*<([A-Za-z0-9_+.-]{1,32})>(?=[ \t]*(?:\(|$))", re.MULTILINE)
 _NESTED = re.compile(r"\([^()\n]*\([^)\n]*\)")
-_COLON = re.compile(r"^([ \t]*):(?=[0-9])", re.MULTILINE)
+_COLON = re.compile(r"^([ \t]*):(?=[0-9]+[ \t]*(?:\(|$))", re.MULTILINE)
+#: a block number that marks a place to begin from, as of NX
+_PLACE = re.compile(r"^([ \t]*):(?=[0-9])", re.MULTILINE)
 _FILE = re.compile(r"^\$[^\n%]*%[ \t]*$", re.MULTILINE)
 _SKIP = re.compile(r"^/[1-9]")
 #: rounding or chamfer of the corner behind a motion, and an angle or what else stands behind a comma
@@ -111,10 +113,11 @@ class Fanuc(Dialect):
     """See above."""
 
     def prepare(self, text: str) -> str:
-        """A program number may begin with : instead of O; the first line may hold the name of a file ($A.MIN%), that
-        of the program in <>. A comment ends at its first ), whatever it holds.
+        """A program number may begin with : instead of O; with words behind it, that is a block number. The first line
+        may hold the name of a file ($A.MIN%), that of the program in <>. A comment ends at its first ), whatever it
+        holds.
         """
-        text = _NAME.sub(r"(\1)", _FILE.sub("%", _COLON.sub(r"\1O", text)))
+        text = _NAME.sub(r"(\1)", _FILE.sub("%", _PLACE.sub(r"\1N", _COLON.sub(r"\1O", text))))
         return _NESTED.sub(lambda found: f"({found[0][1:].replace('(', '[')}", text)
 
     def begin(self, c: Controller, text: str) -> None:
@@ -388,6 +391,9 @@ def _corners(text: str, c: Controller) -> str:
     """
     if "," not in text or OUTPUTS.match(text):
         return text
+    if "g61.1" in text:
+        # a class of accuracy of a Mazak
+        return _CORNER.sub("", text)
     for found in _CORNER.finditer(text):
         size = read_value(found[2], 0, c.parameters)[0] * c.state.scale
         said = found[0].upper()
