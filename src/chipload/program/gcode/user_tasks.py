@@ -51,42 +51,42 @@ def user_tasks(text: str) -> str:
     local = dict.fromkeys(hit[1] for hit in _LOCAL.finditer(plain) if hit[1] not in _WORDS)
     places = {name: f"#{LOCAL + k}" for k, name in enumerate(local, start=1)}
     names = re.compile(rf"(?<![A-Z0-9])(?:{'|'.join(sorted(places, key=len, reverse=True))})(?![A-Z0-9])")
-    labels, programs = _numbered(_LABEL, plain), _numbered(_PROGRAM, plain)
+    labels, programs = _number_names(_LABEL, plain), _number_names(_PROGRAM, plain)
 
-    def carried(line: str) -> str:
-        line = _COMMON.sub(lambda hit: f"#{_common(int(hit[1]))}", line)
+    def carry_line(line: str) -> str:
+        line = _COMMON.sub(lambda hit: f"#{_number_of_common(int(hit[1]))}", line)
         if places:
             line = names.sub(lambda hit: places[hit[0]], line)
         line = _LABEL.sub(lambda hit: f"N{labels[hit[1]]}" if hit[1] in labels else hit[0], line)
         line = _PROGRAM.sub(lambda hit: f"O{programs[hit[1]]}" if hit[1] in programs else hit[0], line)
         line = _JUMP.sub("GOTO ", _TARGET.sub("] GOTO ", line))
         line = re.sub(r"\bRTS\b", "M99", re.sub(r"\bMODOUT\b", "G67", line))
-        return _bracketed(_called(line))
+        return _put_brackets(_replace_calls(line))
 
-    return "\n".join(_outside_comments(line, carried) for line in text.split("\n"))
+    return "\n".join(_change_outside_comments(line, carry_line) for line in text.split("\n"))
 
 
-def _common(number: int) -> int:
+def _number_of_common(number: int) -> int:
     return (COMMON if number <= NEAR else FAR_COMMON) + number
 
 
-def _numbered(pattern: re.Pattern[str], plain: str) -> dict[str, int]:
+def _number_names(pattern: re.Pattern[str], plain: str) -> dict[str, int]:
     """Numbers of names, by their place in the text."""
     found = dict.fromkeys(hit[1] for hit in pattern.finditer(plain))
     return {name: NAMED + k for k, name in enumerate(found, start=1)}
 
 
-def _outside_comments(line: str, carried: Callable[[str], str]) -> str:
+def _change_outside_comments(line: str, carry: Callable[[str], str]) -> str:
     """A line with what is outside of its comments changed; comments follow it."""
     comments = "".join(_COMMENT.findall(line))
     plain = _COMMENT.sub(" ", line)
     if not re.search(r"[A-Za-z]{2}|=", plain):
         return line
-    changed = carried(plain.upper().rstrip())
+    changed = carry(plain.upper().rstrip())
     return f"{changed} {comments}".rstrip() if comments else changed
 
 
-def _called(line: str) -> str:
+def _replace_calls(line: str) -> str:
     """CALL and MODIN as M98 and G66; what follows sets variables, and Q repeats."""
     found = _CALL.search(line)
     if found is None:
@@ -100,7 +100,7 @@ def _called(line: str) -> str:
     return " ".join(x for x in (line[: found.start()].strip(), f"M98 P{found[2]}{times}", sets) if x)
 
 
-def _bracketed(line: str) -> str:
+def _put_brackets(line: str) -> str:
     """Values behind = in brackets: a value ends before a blank outside of brackets."""
     out, at = [], 0
     for hit in _VALUE.finditer(line):

@@ -230,7 +230,7 @@ class _Modes:
         elif code == 72:
             yield from _cycle(11, "SCALING", [f"SCL {b.words.get('F', '1')}"])
         elif code == 73:
-            yield from _cycle(10, "ROTATION", [f"{self.step}ROT{_signed(b.words.get('H', '+0'))}"])
+            yield from _cycle(10, "ROTATION", [f"{self.step}ROT{_with_sign(b.words.get('H', '+0'))}"])
         elif code == 80:
             yield from _cycle(19, "WORKING PLANE", [" ".join(b.axes)] if b.axes else [])
         elif code == 83:
@@ -274,5 +274,5 @@ def _cycle(number: int, name: str, values: list[str]) -> Iterator[str]:
         yield f"CYCL DEF {number}.{k} {value}".rstrip()
 
 
-def _signed(value: str) -> str:
+def _with_sign(value: str) -> str:
     return value if value[:1] in "+-" else f"+{value}"
