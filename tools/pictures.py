@@ -11,7 +11,8 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from PIL import Image
@@ -19,6 +20,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from web_lists import choose
+from web_questions import QUESTIONS, ask, take_back
 
 DOCS = Path(__file__).parent.parent / "docs"
 EXAMPLES = Path(__file__).parent.parent / "src" / "chipload" / "examples"
@@ -53,6 +55,38 @@ POSED = {
     "page_impeller": f"{{ const v = {VIEW}, c = v.camera.position; "
     "v.lookFrom(c.clone().set(0.85, -0.45, 0.75).normalize()); v.closer(0.35); }"
 }
+#: pictures of the 3D view alone: the example, and what the view does; the greatest deflection is that of one step
+SCENES = {
+    "part_deflection": (
+        "part",
+        f"""{{ const v = {VIEW}, map = v.header.maps.find(m => m.moved), at = v.doc.f4(map.positions),
+        values = v.doc.f4(map.values); let k = 0; values.forEach((x, i) => {{ if (x > values[k]) k = i; }});
+        const p = [0, 1, 2].map(i => at[3 * k + i]);
+        // the step whose tip is nearest to the place that is bent most, at a depth that cuts
+        let best = 0, least = Infinity;
+        for (let r = 0; r < v.path.count; r++) {{
+          const q = v.path.points.slice(3 * r, 3 * r + 3);
+          const d = Math.hypot(q[0] - p[0], q[1] - p[1], 0.3 * (q[2] - p[2]));
+          if (q[2] < p[2] && d < least) {{ least = d; best = r; }} }}
+        v.go(best);
+        const factor = v.map(map.name, 0.8).toFixed(0);
+        for (const name of ['path', 'marks', 'engagement', 'part']) v.layer(name, false);
+        v.lookFrom(v.camera.position.clone().set(0.95, -0.75, 0.72).normalize()); v.closer(0.12);
+        v.colouring = null; v.legend();
+        const far = values[k].toFixed(1);
+        v.overlay.message(`wall bent by ${{far}} \u00b5m under the cutter, drawn \u00d7 ${{factor}}`, true);
+        }}""",
+    ),
+}
+#: examples of the picture of the first page
+HOME = ("feeds", "part", "pocket", "contour")
+#: the example that the questions are asked of, and what is chosen in each list
+ASKED = "part"
+CHOSEN = {"compare with": "original", "surface map": "workpiece: workpiece deflection"}
+#: the 3D view without its controls
+ALONE = """{ document.querySelectorAll('.cl-controls, .cl-buttons').forEach(e => { e.style.display = 'none'; });
+    document.querySelector('.cl-space').style.gridTemplate = 'minmax(0, 1fr) / minmax(0, 1fr)';
+    document.querySelector('.cl-stage').style.gridArea = '1 / 1'; }"""
 #: moves figures into a sheet of their own, above the page
 SHEET = """(wanted) => {
     const sheet = document.createElement('div');
@@ -88,18 +122,30 @@ def photograph(page: Page, report: Path, name: str) -> None:
     page.locator("#sheet").screenshot(path=DOCS / f"{name}.png")
 
 
-def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
-    """Write docs/NAME.png: the page of a folder with one result, by itself or beside another track along the path."""
+@contextmanager
+def opened_page(chromium: Browser, folder: Path, query: str, size: tuple[int, int] = (1280, 720)) -> Iterator[Page]:
+    """The page of a folder, in a window of a size."""
     words = [sys.executable, "-m", "chipload", "view", str(folder), "--no-open"]
     server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     try:
         assert server.stdout is not None
         address = next(found[0] for line in server.stdout if (found := re.search(r"http://\S+", line)))
-        page = chromium.new_page(viewport={"width": 1280, "height": 720})
+        page = chromium.new_page(viewport={"width": size[0], "height": size[1]})
         page.set_default_timeout(120_000)
-        page.goto(f"{address}&show=result")
-        page.wait_for_selector(".cv-ramp")
-        page.wait_for_selector(".cl-now")
+        page.goto(f"{address}{query}")
+        if query:
+            page.wait_for_selector(".cv-ramp")
+            page.wait_for_selector(".cl-now")
+        yield page
+        page.close()
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.wait(60)
+
+
+def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
+    """Write docs/NAME.png: the page of a folder with one result, by itself or beside another track along the path."""
+    with opened_page(chromium, folder, "&show=result") as page:
         other = PAGES[name][1]
         if name in POSED:
             page.locator(".cl-slider").click(
@@ -124,10 +170,48 @@ def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
             page.wait_for_function(f"!{VIEW}.dirty")
             page.wait_for_timeout(2000)
         page.screenshot(path=DOCS / f"{name}.png")
-        page.close()
-    finally:
-        server.send_signal(signal.SIGINT)
-        server.wait(30)
+
+
+def photograph_scene(chromium: Browser, folder: Path, name: str) -> None:
+    """Write docs/NAME.png: the 3D view of a result alone, as :data:`SCENES` poses it."""
+    with opened_page(chromium, folder, "&show=result", (1500, 1000)) as page:
+        page.wait_for_function(DRAWN)
+        page.evaluate(ALONE)
+        page.wait_for_timeout(1000)
+        page.evaluate(SCENES[name][1])
+        page.wait_for_function(f"!{VIEW}.dirty")
+        page.wait_for_timeout(1000)
+        page.locator(".cl-stage").screenshot(path=DOCS / f"{name}.png")
+
+
+def photograph_home(chromium: Browser, results: Path) -> None:
+    """Write docs/page_home.png: the first page of a folder of results, those of :data:`HOME` that are there."""
+    with tempfile.TemporaryDirectory() as above:
+        for name in HOME:
+            if (results / name / "summary.json").exists():
+                shutil.copytree(EXAMPLES / name, Path(above) / name)
+                shutil.copytree(results / name, Path(above) / name / "result")
+        with opened_page(chromium, Path(above), "", (1280, 640)) as page:
+            page.wait_for_selector(".cl-result")
+            page.evaluate("document.querySelectorAll('.cl-result img').forEach(i => { i.loading = 'eager'; })")
+            page.wait_for_function("[...document.querySelectorAll('.cl-result img')].every(i => i.naturalWidth)")
+            page.screenshot(path=DOCS / "page_home.png")
+
+
+def photograph_questions(chromium: Browser, folder: Path) -> None:
+    """Write docs/how-to/questions/K.png: the answer to each question of a shop, after its clicks."""
+    shown = DOCS / "how-to" / "questions"
+    shown.mkdir(exist_ok=True)
+    with opened_page(chromium, folder, "&show=result") as page:
+        page.wait_for_function(DRAWN)
+        for k, question in enumerate(QUESTIONS, 1):
+            ask(page, question, CHOSEN)
+            if ("choose", "compare with") in question.clicks:
+                page.wait_for_function(f"{VIEW}.paired && {SECOND}.frames > 0")
+            page.wait_for_timeout(2500)
+            page.screenshot(path=shown / f"{k}.png")
+            fewer_colours(shown / f"{k}.png")
+            take_back(page, question, CHOSEN)
 
 
 def fewer_colours(path: Path) -> None:
@@ -142,14 +226,22 @@ def take(names: Sequence[str], results: Path) -> None:
         chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         page = chromium.new_page(viewport={"width": 860, "height": 1266})
         for name in names:
-            if name in PAGES:
+            if name == "page_home":
+                photograph_home(chromium, results)
+            elif name in PAGES or name in SCENES or name == "questions":
+                example = PAGES[name][0] if name in PAGES else SCENES[name][0] if name in SCENES else ASKED
                 with tempfile.TemporaryDirectory() as folder:
                     # with the files of the example beside it: the page shows the program of the job
-                    shutil.copytree(EXAMPLES / PAGES[name][0], Path(folder) / "job")
-                    shutil.copytree(results / PAGES[name][0], Path(folder) / "result")
-                    photograph_page(chromium, Path(folder), name)
+                    shutil.copytree(EXAMPLES / example, Path(folder) / "job")
+                    shutil.copytree(results / example, Path(folder) / "result")
+                    if name == "questions":
+                        photograph_questions(chromium, Path(folder))
+                        print("docs/how-to/questions", flush=True)
+                        continue
+                    (photograph_page if name in PAGES else photograph_scene)(chromium, Path(folder), name)
             else:
                 photograph(page, results / name / "report.html", name)
-            fewer_colours(DOCS / f"{name}.png")
+            if name not in SCENES:  # its shades would become bands
+                fewer_colours(DOCS / f"{name}.png")
             print(f"docs/{name}.png", flush=True)
         chromium.close()

@@ -43,3 +43,4 @@ def test_gouge_and_excess_and_a_signed_error_have_two_lines() -> None:
     excess, error = shown_maps(one, one.tracks[0], {"excess_mm": 0.25, "gouge_mm": 0.1, "form_error_um": 0.4})
     assert np.unique(excess.lines[..., 0].round(6)).tolist() == [16.0, 30.0]
     assert np.unique(error.lines[..., 0].round(6)).tolist() == [4.0, 36.0]
+    assert (excess.tolerance, error.tolerance) == ((-0.1, 0.25), (-0.4, 0.4))

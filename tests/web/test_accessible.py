@@ -1,8 +1,13 @@
 """The page for keyboards, readers of the screen and small windows."""
 
+import itertools
+from pathlib import Path
+
 import pytest
 
-from web_lists import AXE, VIEW, play_slowly, serious_problems, settle, stop
+from square import LINE, ROWS
+from web_lists import AXE, VIEW, drawn, play_slowly, serious_problems, settle, stop
+from web_questions import QUESTIONS, ask, take_back
 
 #: whether a part lies inside a window of this width
 INSIDE = """([part, width]) => {
@@ -86,3 +91,76 @@ def test_axe_finds_nothing_serious(cut) -> None:
         cut.locator(".cl-tabs").get_by_text(tab, exact=True).click()
         cut.locator(shown).first.wait_for()
         assert serious_problems(cut) == [], tab
+
+
+def test_ten_questions_are_answered_within_two_clicks(cut) -> None:
+    assert len(QUESTIONS) == 10
+    assert max(question.count for question in QUESTIONS) == 2
+    cut.keyboard.press("End")
+    settle(cut, ROWS - 1)
+    options = {"compare with": "square", "surface map": "sheet: torque"}
+    for question in QUESTIONS:
+        ask(cut, question, options)
+        take_back(cut, question, options)
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "questions.md").read_text()
+    for number, question in enumerate(QUESTIONS, 1):
+        assert f"| {question.text} | {question.count} |" in page
+        assert f"](questions/{number}.png)" in page
+
+
+def test_the_page_is_dark_as_the_system_is_or_by_its_switch(cut) -> None:
+    def is_dark(dark: bool) -> None:
+        cut.wait_for_function("d => document.body.classList.contains('body--dark') == d", arg=dark)
+        drawn(cut)
+        ground, scale = cut.evaluate(f"[{VIEW}.scene.background.getHex(), {VIEW}.header.scale[0][1]]")
+        assert (ground, scale) == ((0x1B2128, "#7d6fd6") if dark else (0xEEF1F5, "#30245c"))
+
+    is_dark(False)
+    cut.emulate_media(color_scheme="dark")
+    is_dark(True)
+    # every stop of the scale is seen on its ground (contrast of WCAG), and none is darker than the one before by much
+    stops = [luminance(colour) for _, colour in cut.evaluate(f"{VIEW}.header.scale")]
+    assert min((stop + 0.05) / (luminance("#1b2128") + 0.05) for stop in stops) > 3.0
+    assert all(b > 0.9 * a for a, b in itertools.pairwise(stops))
+    assert serious_problems(cut) == []
+    cut.get_by_role("button", name="dark or light (d)").click()
+    is_dark(False)
+    cut.emulate_media(color_scheme="light")
+    is_dark(False)
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of a colour `#rrggbb` (WCAG 2.2)."""
+    parts = [int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def test_wheel_and_keys_step_and_change_the_speed_and_a_tab_keeps_the_step(cut) -> None:
+    cut.keyboard.press("Home")
+    settle(cut, 0)
+    cut.locator(".cl-slider").hover()
+    cut.mouse.wheel(0, 120)
+    settle(cut, 1)
+    cut.keyboard.down("Shift")
+    cut.mouse.wheel(0, 120)
+    cut.keyboard.up("Shift")
+    # the next line of the program begins with its first step
+    settle(cut, int((LINE[1] != LINE).argmax()))
+    row = cut.evaluate(f"{VIEW}.row")
+    for name in ("tools", "lines", "limits"):
+        cut.locator(".cl-tabs").get_by_text(name, exact=True).click()
+        settle(cut, row)
+    speed = cut.locator(".cl-speed")
+    for key, shown in (("+", "\u00d70.1"), ("+", "\u00d71"), ("-", "\u00d70.1")):
+        cut.keyboard.press(key)
+        speed.get_by_text(shown, exact=True).wait_for()
+    speed.hover()
+    cut.mouse.wheel(0, -120)
+    speed.get_by_text("\u00d71", exact=True).wait_for()
+    cut.keyboard.press("?")
+    keys = cut.locator(".cl-keys").inner_text()
+    for key in ("wheel", "+ \u2212", "Space", "h"):
+        assert key in keys
+    cut.keyboard.press("Escape")
+    cut.wait_for_selector(".cl-keys", state="hidden")

@@ -151,9 +151,27 @@ def test_a_map_shows_its_limit_as_a_line_and_bends(cut, pixels) -> None:
     assert factor <= most * (1.0 + 1e-6)
     cut.wait_for_function("t => document.body.textContent.includes(t)", arg=f"deflection x {factor:.3g}")
     assert cut.evaluate(f"{VIEW}.map('sheet', 1)") == pytest.approx(most, rel=1e-5)
+    # in the colours of a tolerance from 4 to 12 N m: red to x = 10, green to x = 30, blue beyond
+    cut.evaluate(
+        f"(() => {{ const v = {VIEW}; v.header.maps[0].tolerance = [4, 12]; v.map('sheet|tolerance', 0); }})()"
+    )
+    data = cut.evaluate(f"{VIEW}.picture()")
+    rgb = pixels(base64.b64decode(data.split(",", 1)[1])).astype(int)
+    cover = [((rgb.argmax(axis=2) == k) & (rgb.max(axis=2) - rgb.min(axis=2) > 60)).sum() for k in range(3)]
+    assert np.array(cover) / sum(cover) == pytest.approx([0.25, 0.5, 0.25], abs=0.03)
+    legend = cut.locator(".cv-bar").inner_text()
+    for words in ("below 4", "within the tolerance", "above 12"):
+        assert words in legend
     choose(cut, "surface map", "no map")
     cut.wait_for_function(f"{VIEW}.state().map == ''")
     cut.evaluate("".join(f"{VIEW}.layer({name!r}, true);" for name in others))
+
+
+def test_the_path_is_coloured_by_tool(cut) -> None:
+    choose(cut, "path coloured by", "tool")
+    cut.locator(".cv-bar").get_by_text("T1", exact=True).wait_for()
+    assert cut.locator(".cv-bar .cv-dot").count() >= 1
+    choose(cut, "path coloured by", "force")
 
 
 def test_a_result_without_samples_says_so(browser, served) -> None:

@@ -67,6 +67,8 @@ export interface SurfaceMap {
   low: number;
   high: number;
   limit: number | null;
+  /** least and greatest allowed value of a deviation; null: that side, or both, are not limited */
+  tolerance: [number | null, number | null] | null;
   positions: Buffer;
   index: Buffer;
   values: Buffer;

@@ -4,32 +4,32 @@ import { Colouring, Header, MapLegend } from "./document";
 
 const STYLE = `
 .cv { width: 100%; height: 100%; overflow: hidden; display: flex; flex-direction: column;
-  font: 12px/1.35 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; color: #1f2933; }
+  font: 12px/1.35 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; color: var(--ink, #1f2933); }
 .cv-stage { position: relative; flex: 1; min-height: 0; touch-action: none; }
 .cv-stage canvas { position: absolute; inset: 0; display: block; width: 100%; height: 100%; outline-offset: -2px; }
-.cv-scale, .cv-tip, .cv-note { position: absolute; background: rgba(255,255,255,.86); border-radius: 4px; padding: 4px 8px;
+.cv-scale, .cv-tip, .cv-note { position: absolute; background: var(--veil, rgba(255,255,255,.86)); border-radius: 4px; padding: 4px 8px;
   pointer-events: none; }
 .cv-bar { flex: none; display: flex; flex-wrap: wrap; gap: 2px 20px; padding: 3px 8px 4px; max-height: 40%; overflow-y: auto;
-  background: #fff; border-top: 1px solid #e3e7ec; font-size: 11.5px; }
+  background: var(--paper, #fff); border-top: 1px solid var(--rule, #e3e7ec); font-size: 11.5px; }
 .cv-bar > div { flex: 1 1 190px; max-width: 380px; min-width: 0; }
 .cv-head, .cv-ends, .cv-map-ends { display: flex; flex-wrap: wrap; gap: 0 10px; align-items: center; }
 .cv-ends, .cv-map-ends { flex-wrap: nowrap; gap: 6px; font-variant-numeric: tabular-nums; }
 .cv-title { font-weight: 600; }
 .cv-ramp { flex: 1; height: 12px; border-radius: 2px; position: relative; text-align: center; font-size: 10px; line-height: 12px; }
 .cv-ramp i { position: absolute; top: -2px; bottom: -2px; width: 0; border-left: 2.5px solid #c81e1e; }
-.cv-red { color: #b01818; font-weight: 600; }
+.cv-red { color: var(--bad, #b01818); font-weight: 600; }
 .cv-dot { display: inline-block; width: 10px; height: 10px; border-radius: 5px; margin-right: 6px; }
 .cv-scale { right: 100px; bottom: 6px; padding: 2px 6px; text-align: center; font-size: 11px; }
-.cv-scale div { border: 1.5px solid #1f2933; border-top: 0; height: 5px; }
+.cv-scale div { border: 1.5px solid var(--ink, #1f2933); border-top: 0; height: 5px; }
 .cv-tip { display: none; white-space: pre; font-size: 11.5px; font-variant-numeric: tabular-nums; z-index: 3; }
-.cv-note { left: 6px; top: 6px; color: #b01818; font-weight: 600; max-width: 70%; }
+.cv-note { left: 6px; top: 6px; color: var(--bad, #b01818); font-weight: 600; max-width: 70%; }
 .cv-note:empty { display: none; }
-.cv-plain { color: #1f2933; }
+.cv-plain { color: var(--ink, #1f2933); }
 .cv-box { height: 520px; border: 1px solid #d9dde2; }
 .cv-controls { display: flex; flex-wrap: wrap; gap: 4px 12px; align-items: center; padding: 4px 0; font-size: 13px; }
 .cv-controls button, .cv-controls select { font: inherit; padding: 3px 10px; }
 .cv-controls input[type=range] { flex: 1; min-width: 160px; }
-.cv-cut { font: 12px/1.35 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; color: #1f2933; }
+.cv-cut { font: 12px/1.35 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; color: var(--ink, #1f2933); }
 .cv-cut-said { padding: 4px 2px; font-variant-numeric: tabular-nums; }
 .cv-cut-body { display: grid; grid-template-columns: repeat(auto-fit, minmax(210px, 1fr)); gap: 6px; }
 .cv-chip { min-height: 200px; border: 1px solid #d9dde2; position: relative; touch-action: none; }

@@ -2,7 +2,7 @@
 
 import { CutPanel } from "./cut";
 import { Document, unpacked } from "./document";
-import { View, Why } from "./view";
+import { BANDED, View, Why } from "./view";
 
 type Told = { row: number; why: Why };
 const WHOLE = 30, SIDES = ["iso", "top", "front", "side"];
@@ -102,10 +102,13 @@ function choices(view: View, doc: Document, shared: Document, bar: HTMLElement, 
   if (view.stock) check("values on stock", false, (on) => view.drape(on));
   if (!maps.length) return;
   const chosen = made("select", "", "surface map"), bent = made("input", "", "scale of the deflection");
-  chosen.append(new Option("no map", ""), ...maps.map((m) => new Option(`map: ${m.name}, ${m.label}`, m.name)));
+  chosen.append(new Option("no map", ""), ...maps.flatMap((m) => [
+    new Option(`map: ${m.name}, ${m.label}`, m.name),
+    ...(m.tolerance ? [new Option(`tolerance: ${m.name}, ${m.label}`, m.name + BANDED)] : []),
+  ]));
   Object.assign(bent, { type: "range", min: "0", max: "1", step: "any", value: "0" });
   bent.style.flex = "0 1 120px";
-  const show = () => { view.map(chosen.value, Number(bent.value)); bent.style.display = maps.find((m) => m.name === chosen.value)?.moved ? "" : "none"; };
+  const show = () => { view.map(chosen.value, Number(bent.value)); bent.style.display = maps.find((m) => m.name === chosen.value.replace(BANDED, ""))?.moved ? "" : "none"; };
   chosen.onchange = bent.oninput = show;
   bar.append(chosen, bent);
   show();

@@ -10,6 +10,8 @@ import { shade } from "./path";
 /** the greatest displacement is drawn as at most this share of the size of the surface */
 const BENT = 0.12;
 const STOPS = 5;
+/** below, within and above the tolerance, as in CAD and CAM; the three differ in brightness too */
+const BANDS: [number, number, number][] = [[179, 32, 28], [104, 190, 120], [52, 98, 216]];
 /** width of the lines of the limit [pixels] */
 const WIDTH = 2.2;
 
@@ -20,7 +22,7 @@ export class MapBody {
   private readonly places: [(to: Float32Array) => void, Float32Array, Float32Array | null][];
   factor = 0;
 
-  constructor(doc: Document, readonly map: SurfaceMap, private readonly header: Header) {
+  constructor(doc: Document, readonly map: SurfaceMap, private readonly header: Header, readonly banded = false) {
     const values = doc.f4(map.values), colours = new Float32Array(3 * values.length), c = new THREE.Color();
     values.forEach((v, k) => {
       const [r, g, b] = Number.isFinite(v) ? this.colour(v) : [150, 156, 165];
@@ -64,8 +66,17 @@ export class MapBody {
   }
 
   legend(): MapLegend {
-    const { label, unit, low, high, limit } = this.map, hex = (v: number) => "#" + this.colour(v).map((x) => x.toString(16).padStart(2, "0")).join("");
+    const { label, unit, high, limit } = this.map, hex = (v: number) => "#" + this.colour(v).map((x) => x.toString(16).padStart(2, "0")).join("");
+    // next to the greatest value it is nothing
+    const low = Math.abs(this.map.low) < 1e-4 * Math.abs(high) ? 0 : this.map.low;
     const stops = Array.from({ length: STOPS }, (_, k) => low + (high - low) * k / (STOPS - 1)).map((v) => [v, hex(v)] as [number, string]);
+    const [least, most] = this.map.tolerance ?? [null, null], text = (v: number) => String(Number(v.toPrecision(4)));
+    if (this.banded) {
+      const names = [least === null ? "" : `below ${text(least)}`, "within the tolerance", most === null ? "" : `above ${text(most)}`];
+      const colours = BANDS.map((c) => "#" + c.map((x) => x.toString(16).padStart(2, "0")).join(""));
+      const bands = names.map((name, k) => [name, colours[k]] as [string, string]).filter(([name]) => name);
+      return { title: unit ? `${label} [${unit}]` : label, stops: [], words: bands };
+    }
     const words: [string, string][] = limit !== null && this.map.lines.n ? [[`limit ${Number(limit.toPrecision(4))}`, "#d01414"]] : [];
     return { title: unit ? `${label} [${unit}]` : label, stops, words };
   }
@@ -79,7 +90,8 @@ export class MapBody {
   }
 
   private colour(v: number): [number, number, number] {
-    const { low, high } = this.map;
+    const { low, high, tolerance } = this.map;
+    if (this.banded && tolerance) return BANDS[v < (tolerance[0] ?? -Infinity) ? 0 : v > (tolerance[1] ?? Infinity) ? 2 : 1];
     return shade(this.header.scale, high > low ? (v - low) / (high - low) : 0);
   }
 }

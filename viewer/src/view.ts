@@ -17,12 +17,16 @@ import { recorded, saved } from "./save";
 import { Stock } from "./stock";
 import { MapBody } from "./surface";
 
-const BACKGROUND = 0xeef1f5, NEAR = 14;
+const BACKGROUND = 0xeef1f5, DARK = 0x1b2128, NEAR = 14;
+/** the scale on a dark ground: as bright at its end, and seen at its beginning */
+const DARK_SCALE: [number, string][] = [[0, "#7d6fd6"], [0.25, "#4f97d8"], [0.5, "#22c29a"], [0.75, "#9bd93c"], [1, "#fbb61a"]];
 /** distance of the camera, and half the height of a picture of a mark, in sizes of what is shown */
 const AWAY = 6, CLOSE = 0.24;
 const VIEWS: Record<string, [number, number, number]> = {
   iso: [0.62, -1, 0.78], top: [0, -0.001, 1], front: [0, -1, 0.02], side: [1, 0, 0.02], below: [0, -0.001, -1],
 };
+/** end of the name of a map in the colours of its tolerance */
+export const BANDED = "|tolerance";
 type Layer = "stock" | "path" | "cutter" | "marks" | string;
 /** Why a view tells its row: it plays, it was stopped, it came to the end, its path was clicked. */
 export type Why = "playing" | "stopped" | "ended" | "clicked";
@@ -52,6 +56,8 @@ export class View {
   /** told where the view stands */
   readonly stood = new Set<() => void>();
   private colouring: Colouring | null = null;
+  private painted: Document | null = null;
+  private lightScale: [number, string][] | null = null;
   private hidden = new Set<Layer>();
   /** the section as it lies in the view, and in the work */
   private plane: THREE.Plane | null = null;
@@ -99,6 +105,7 @@ export class View {
     canvas.addEventListener("click", (e) => {
       if (Math.hypot(e.clientX - down[0], e.clientY - down[1]) < 5) this.click(e);
     });
+    new MutationObserver(() => { this.dirty = true; this.relight(); }).observe(document.body, { attributeFilter: ["class"] });
     new ResizeObserver(() => { this.dirty = true; }).observe(this.overlay.stage);
     const loop = (now: number) => {
       if (!host.isConnected) { this.renderer.dispose(); return; }
@@ -130,7 +137,9 @@ export class View {
     for (const m of h.marks) {
       this.marks.add(new Ring(m));
     }
-    this.colour(doc, h.colouring);
+    this.colouring = h.colouring;
+    this.painted = doc;
+    this.relight();
     this.row = -1;
     this.go(this.wanted);
     this.layers();
@@ -142,6 +151,7 @@ export class View {
   /** Colour the path, and what was cut, by a column. */
   colour(doc: Document | null, c: Colouring | null): void {
     this.colouring = c;
+    this.painted = doc;
     this.path.colour(doc, c, this.header);
     this.path.clip(this.plane ? [this.plane] : []);
     this.legend();
@@ -151,21 +161,35 @@ export class View {
     this.dirty = true;
   }
 
+  /** The ground and the scale are those of a dark page or of a light one. */
+  private relight(): void {
+    const dark = document.body.classList.contains("body--dark");
+    (this.scene.background as THREE.Color).set(dark ? DARK : BACKGROUND);
+    if (!this.header) return;
+    this.lightScale ??= this.header.scale;
+    this.header.scale = dark ? DARK_SCALE : this.lightScale;
+    this.colour(this.painted, this.colouring);
+    const map = this.shownMap;
+    if (map) { const share = map.most > 0 ? map.factor / map.most : 0; this.map(""); this.map(map.map.name + (map.banded ? BANDED : ""), share); }
+  }
+
   private legend(): void {
     const maps = this.solids.filter((s) => s.group.visible).map((s) => s.body.legend);
     this.overlay.legend(this.header, this.colouring, [...maps.filter((m) => m !== undefined), ...(this.shownMap ? [this.shownMap.legend()] : [])]);
   }
 
-  /** Show a surface map in the place of part and stock, bent by a share of the greatest factor; "": none. The factor. */
+  /** Show a surface map in the place of part and stock, bent by a share of the greatest factor; "": none. The factor.
+   * A name that ends with BANDED is shown in the colours of the tolerance. */
   map(name: string, share = 0): number {
-    const found = this.doc?.header.maps?.find((m) => m.name === name);
-    if (this.shownMap && this.shownMap.map !== found) {
+    const banded = name.endsWith(BANDED), own = banded ? name.slice(0, -BANDED.length) : name;
+    const found = this.doc?.header.maps?.find((m) => m.name === own);
+    if (this.shownMap && (this.shownMap.map !== found || this.shownMap.banded !== banded)) {
       this.work.remove(this.shownMap.group);
       this.shownMap.dispose();
       this.shownMap = null;
     }
     if (found && !this.shownMap) {
-      this.shownMap = new MapBody(this.doc, found, this.header);
+      this.shownMap = new MapBody(this.doc, found, this.header, banded);
       this.shownMap.clip(this.plane ? [this.plane] : []);
       this.work.add(this.shownMap.group);
     }

@@ -13,6 +13,18 @@ BARS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
 #: a bar ends at most at so many times the limit
 LONGEST = 3.0
 
+#: style of :func:`answer_html`, for report and page; --ink and --track are theirs
+STYLE = """.answer { display: flex; flex-wrap: wrap; gap: 2px 14px; align-items: center; color: var(--ink); }
+.answer .value { font-weight: 650; }
+.limit-bar { position: relative; display: inline-block; flex: 0 1 220px; min-width: 90px; height: 12px;
+  background: var(--track, #dfe4ea); border-radius: 3px; -webkit-print-color-adjust: exact; print-color-adjust: exact; }
+.limit-bar b, .limit-bar i, .limit-bar u { position: absolute; top: 0; bottom: 0; display: block; left: 0; }
+.limit-bar u { top: -3px; bottom: -3px; width: 0; border-left: 2.5px solid var(--ink); margin-left: -2px; }
+.limit-bar.ok b { background: #3f936f; } .limit-bar.ok i { background: #a3d0bb; }
+.limit-bar.no b { background: #b3261e; } .limit-bar.no i { background: #e3a8a3; }
+.limit-bar.may b { background: #d19a1f; } .limit-bar.may i { background: #ecd39a; }
+"""
+
 
 @dataclass(frozen=True)
 class BarShares:

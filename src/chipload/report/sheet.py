@@ -14,7 +14,11 @@ from typing import Any
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
-_STYLE = """
+from chipload.report.answer import STYLE as ANSWER_STYLE
+
+_STYLE = (
+    ANSWER_STYLE
+    + """
 :root { --ink: #1f2933; --soft: #5f6b7a; --line: #d9dde2; --good: #0b6b4f; --bad: #b3261e; --may: #8a5a00;
   --paper: #ffffff; }
 * { box-sizing: border-box; }
@@ -34,15 +38,6 @@ p { margin: 4px 0 8px; max-width: 92ch; }
 .open { color: var(--may); border-color: #d19a1f; background: #fdf3dc; }
 .verdict span { color: var(--ink); display: block; }
 .verdict .more { font-size: 13px; color: var(--soft); }
-.answer { display: flex; flex-wrap: wrap; gap: 2px 14px; align-items: center; color: var(--ink); }
-.answer .value { font-weight: 650; }
-.limit-bar { position: relative; display: inline-block; flex: 0 1 220px; min-width: 90px; height: 12px;
-  background: #dfe4ea; border-radius: 3px; -webkit-print-color-adjust: exact; print-color-adjust: exact; }
-.limit-bar b, .limit-bar i, .limit-bar u { position: absolute; top: 0; bottom: 0; display: block; left: 0; }
-.limit-bar u { top: -3px; bottom: -3px; width: 0; border-left: 2.5px solid #1f2933; margin-left: -2px; }
-.limit-bar.ok b { background: #3f936f; } .limit-bar.ok i { background: #a3d0bb; }
-.limit-bar.no b { background: #b3261e; } .limit-bar.no i { background: #e3a8a3; }
-.limit-bar.may b { background: #d19a1f; } .limit-bar.may i { background: #ecd39a; }
 .verdict .answer span { display: inline-block; } .verdict .answer { font-size: 15px; }
 .note { color: var(--soft); font-size: 13px; }
 td code { white-space: nowrap; }
@@ -65,6 +60,7 @@ code { font: 12.5px ui-monospace, "DejaVu Sans Mono", monospace; }
 @media (max-width: 760px) { main { padding: 12px 10px 32px; } table { display: block; overflow-x: auto; }
   .figure { max-width: 100%; overflow: hidden; } dl { display: block; } dd { margin: 0 0 6px 12px; } }
 """
+)
 #: unpacks a script that the file holds compressed
 _LIBRARIES = """
 async function library(id) {

@@ -29,6 +29,7 @@ class ShownMap:
     limit : that the isolines stand for; None: none is stated
     lines : (k, 2, 3) [mm] isolines, a piece for each triangle that they cross
     moved, lines_moved : (n, 3), (k, 2, 3) [mm] how the points and the lines are displaced; None: nothing bends
+    tolerance : least and greatest value of a deviation that is allowed, None: that side is not limited; None: neither
     """
 
     name: str
@@ -43,6 +44,7 @@ class ShownMap:
     lines: Floats
     moved: Floats | None = None
     lines_moved: Floats | None = None
+    tolerance: tuple[float | None, float | None] | None = None
 
 
 def isolines(faces: Ints, values: Floats, level: float, columns: Floats) -> Floats:
@@ -89,7 +91,7 @@ def _show_map(one: SurfaceMap, bounds: Mapping[str, float]) -> ShownMap:
     return ShownMap(
         one.name, column.label, column.unit, np.asarray(one.points, dtype=np.float64), one.faces, values,
         float(finite.min()), float(finite.max()), limit, lines[..., :3], moved,
-        None if moved is None else lines[..., 3:],
+        None if moved is None else lines[..., 3:], tolerance_of(one.column, bounds),
     )  # fmt: skip
 
 
@@ -101,3 +103,21 @@ def _levels(column: str, bounds: Mapping[str, float]) -> Sequence[float]:
     if column == "excess_mm" and "gouge_mm" in bounds:
         out.append(-bounds["gouge_mm"])
     return out
+
+
+def tolerance_of(column: str, bounds: Mapping[str, float]) -> tuple[float | None, float | None] | None:
+    """Least and greatest allowed value of a column that is a deviation from the part; None: it is none, or not limited.
+
+    >>> tolerance_of("excess_mm", {"gouge_mm": 0.02, "excess_mm": 0.1}), tolerance_of("excess_mm", {"gouge_mm": 0.02})
+    ((-0.02, 0.1), (-0.02, None))
+    >>> tolerance_of("deflection_um", {"deflection_um": 30.0}) is None
+    True
+    """
+    upper = bounds.get(column)
+    if column == "excess_mm":
+        lower = -bounds["gouge_mm"] if "gouge_mm" in bounds else None
+    elif COLUMNS[column].signed:
+        lower = None if upper is None else -upper
+    else:
+        return None
+    return None if lower is None and upper is None else (lower, upper)

@@ -313,6 +313,7 @@ def _map(one: ShownMap, out: Buffers) -> dict[str, Any]:
         "low": one.low,
         "high": one.high,
         "limit": one.limit,
+        "tolerance": one.tolerance,
         "positions": out.put(one.points, "f4"),
         "index": out.put(one.faces, "u4"),
         "values": out.put(one.values, "f4"),

@@ -56,6 +56,8 @@ class KeyNumber:
         first, other = self.values[0], self.values[k]
         if first is None or other is None:
             return None, None
+        if abs(other - first) < 1e-9 * max(abs(first), abs(other)):
+            return 0.0, 0.0 if first != 0.0 else None  # sums in another order
         return other - first, 100.0 * (other - first) / abs(first) if first != 0.0 else None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Sequence
 from html import escape
 from importlib import resources
@@ -13,6 +14,7 @@ from urllib.parse import quote
 from nicegui import background_tasks, ui
 
 from chipload.errors import InputError, OutputError
+from chipload.report.answer import STYLE as ANSWER_STYLE
 from chipload.report.folder import check_target
 from chipload.result import Verdict
 from chipload.result.changes import Change
@@ -46,6 +48,9 @@ KEYS = (
     ("t", "the next operation or strategy"),
     ("h", "all results and jobs of the folder, with pictures"),
     ("o", "open a result or a job"),
+    ("+ \u2212", "play faster, slower; also the wheel over the speed"),
+    ("wheel", "over the slider: one step back or forward; with Shift a line of the program"),
+    ("d", "dark or light"),
     ("?", "this list"),
 )
 #: seconds between two looks at a run
@@ -72,12 +77,14 @@ class Page:
         self.result: PageResult | None = None
         self.own: JobRun | None = None
         self.seen: JobRun | None = runs.now if runs.now is not None and runs.now.ended else None
+        ui.add_css(ANSWER_STYLE)
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
         ui.add_head_html(
             '<script>document.documentElement.lang = "en"</script><script src="/viewer.js"></script>'
             "<script>chiploadViewer.ownKeys()</script>"
         )
         ui.colors(primary="#2f5d8a")
+        self.dark = ui.dark_mode(None)
         with ui.element("div").classes("cl-page"):
             self._header()
             self._bar()
@@ -88,7 +95,7 @@ class Page:
         self.view.can_run = lambda: self._job_of_result() is not None
         self.view.run_change = self._try_change
         self.opening, self.list = self._dialog("Open")
-        self.running, self.ask = self._dialog("Run")
+        self.running, self.ask = self._dialog("Before the run")
         self._help()
         ui.keyboard(on_key=self._key, ignore=["input", "textarea"])
         ui.timer(LOOK, self._poll)
@@ -163,7 +170,13 @@ class Page:
             with self.report:
                 ui.label("Report")
             self.report.set_visibility(False)
+            _button("", self._switch_dark, "contrast", "dark or light (d)").mark("dark")
             _button("", lambda: self.help.open(), "help_outline", "keys (?)").mark("help")
+
+    async def _switch_dark(self) -> None:
+        """Turn from light to dark or back; before that the page is as the system is."""
+        with contextlib.suppress(TimeoutError):
+            self.dark.set_value(not await ui.run_javascript("document.body.classList.contains('body--dark')"))
 
     def _bar(self) -> None:
         """Where a run is."""
@@ -182,13 +195,13 @@ class Page:
         self.bar.set_visibility(False)
 
     def _dialog(self, title: str) -> tuple[Any, Any]:
-        with ui.dialog() as dialog, ui.card().classes("cl-dialog"):
+        with ui.dialog().props(f'aria-label="{title}"') as dialog, ui.card().classes("cl-dialog"):
             ui.label(title).classes("cl-dialog-title").props("role=heading aria-level=2")
             box = ui.element("div").classes("cl-list")
         return dialog, box
 
     def _help(self) -> None:
-        with ui.dialog() as self.help, ui.card().classes("cl-dialog").mark("keys"):
+        with ui.dialog().props('aria-label="Keys"') as self.help, ui.card().classes("cl-dialog").mark("keys"):
             ui.label("Keys").classes("cl-dialog-title")
             with ui.element("div").classes("cl-keys"):
                 for key, meaning in KEYS:
@@ -459,6 +472,8 @@ class Page:
             self.help.open()
         elif key.name == "o" and not event.action.repeat:
             await self._open()
+        elif key.name == "d" and not event.action.repeat:
+            await self._switch_dark()
         elif key.name == "h" and not event.action.repeat:
             await self._go_home()
         elif self.result is None or self.help.value or self.opening.value or self.running.value:
@@ -473,6 +488,8 @@ class Page:
             self.view.go(len(self.view.track or ()) - 1)
         elif key.name == " " and not event.action.repeat:
             self.view.toggle()
+        elif key.name in ("+", "-", "="):
+            self.view.change_speed(-1 if key.name == "-" else 1)
         elif key.name in ("1", "2", "3", "4"):
             self.view.scene.view_from(("iso", "top", "front", "side")[int(key.name) - 1])
         elif key.name == "t":

@@ -33,13 +33,16 @@ from chipload.web.scene import bodies
 
 #: seconds that a whole track takes where no speed is chosen
 WHOLE = 30.0
-SPEEDS = {0: "30 s", 1: "\u00d71", 10: "\u00d710", 100: "\u00d7100"}
+SPEEDS = {0: "30 s", 0.1: "\u00d70.1", 1: "\u00d71", 3: "\u00d73", 10: "\u00d710", 30: "\u00d730", 100: "\u00d7100"}
 #: classes of a verdict
 VERDICTS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
 #: what is said where nothing is left open
 ALL_CHECKED = "Every limit and check that is stated holds for all cuts."
 #: steps of the slider
 STEPS = 4000
+#: a turn of the wheel: its direction, with Shift (which some systems turn sideways) twice it
+WHEEL = "(e) => { e.preventDefault(); emit(Math.sign(e.deltaY)); }"
+WHEEL_SHIFT = "(e) => { e.preventDefault(); emit(Math.sign(e.deltaY || e.deltaX) * (e.shiftKey ? 2 : 1)); }"
 #: tables and pictures next to the 3D view
 TABLES = {"limits": "limits", "cut": "cut", "tools": "tools", "lines": "lines", "compare": "compare"}
 
@@ -105,6 +108,7 @@ class ResultView:
                 .classes("cl-speed")
             )
             self.speed.on("popup-hide", js_handler=RELEASE)
+            self.speed.on("wheel.prevent", lambda e: self.change_speed(-1 if e.args > 0 else 1), js_handler=WHEEL)
             with self.speed:
                 ui.tooltip("the whole track in 30 s, or a multiple of the machine's speed")
             self.slider = (
@@ -115,6 +119,7 @@ class ResultView:
             # the 3D view follows at once, the other panels when the server has answered
             self.slider.on("update:model-value", js_handler=self.scene.slide)
             self.slider.on("change", js_handler=RELEASE)
+            self.slider.on("wheel.prevent", self._turn_wheel, js_handler=WHEEL_SHIFT)
             self.where = ui.label("").classes("cl-where").mark("where")
 
     async def open(self, result: PageResult) -> None:
@@ -199,6 +204,21 @@ class ResultView:
         row = self.source.step(self.row, by) if self.track is not None else None
         if row is not None:
             self.go(row)
+
+    def change_speed(self, by: int) -> None:
+        """Play at the next faster or slower speed of the list; what plays goes on at it."""
+        speeds = sorted(SPEEDS)[1:]
+        now = speeds.index(self.speed.value) if self.speed.value in speeds else -1
+        self.speed.set_value(speeds[min(max(now + by, 0), len(speeds) - 1)])
+        if self.playing:
+            self.scene.play(float(self.speed.value))
+
+    def _turn_wheel(self, event: Any) -> None:
+        """The wheel was turned over the slider: a step, or a line of the program."""
+        if event.args in (-1, 1):
+            self.move(event.args)
+        elif event.args in (-2, 2):
+            self.line(event.args // 2)
 
     def toggle(self) -> None:
         """Play, or stop playing."""

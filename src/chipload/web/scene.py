@@ -170,6 +170,9 @@ def colour_column(
     """The colours of a column of a track; ``span``: ends of their scale, None: the column's own."""
     values: NDArray[np.float64] | TextColumn = result.column(track, column)
     path = view_path(track)
+    if column == "tool" and not isinstance(values, TextColumn):
+        numbers, codes = np.unique(values, return_inverse=True)
+        values = TextColumn(codes.astype(np.int64), tuple(f"T{number:.0f}" for number in numbers))
     if isinstance(values, TextColumn):
         return colouring_of_words(column, values.codes, values.words, path)
     made = colouring_of(column, values, path, lowest_limit(track.own.limits, column), removal)

@@ -33,6 +33,8 @@ VIEWS = {"iso": "from a corner", "top": "from above", "front": "from the front",
 GLASS, DRAPE, UPRIGHT = "see through", "values on stock", "tool upright"
 #: the engaged sector and surface of the cutter
 ENGAGED = "engagement"
+#: end of the name of a map in the colours of its tolerance, as viewer/src/view.ts has it
+BANDED = "|tolerance"
 #: planes that cut the picture away
 SECTIONS = {"": "no section", "x": "section X", "y": "section Y", "z": "section Z"}
 
@@ -296,13 +298,15 @@ class ScenePanel:
     def _offer_maps(self, scene: PageScene) -> None:
         """Surface maps to choose from; none is shown."""
         names = {one.name: f"{one.name}: {one.label}" for one in scene.maps}
+        names |= {f"{one.name}{BANDED}": f"{one.name}: tolerance" for one in scene.maps if one.tolerance is not None}
         self.bent.set_value(0.0)
         self.map.set_options({"": "no map", **names}, value="")
         self.map.set_visibility(bool(names))
         self._map_controls()
 
     def _map_controls(self) -> None:
-        chosen = next((m for m in (self.scene.maps if self.scene else ()) if m.name == self.map.value), None)
+        name = str(self.map.value or "").removesuffix(BANDED)
+        chosen = next((m for m in (self.scene.maps if self.scene else ()) if m.name == name), None)
         bends = chosen is not None and chosen.moved is not None
         self.bent.set_visibility(bends)
         self.factor.set_visibility(bends)
