@@ -157,7 +157,7 @@ def _surface(body: SceneBody, scale: float, most: int) -> tuple[Floats, Floats]:
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1)
     kept = np.flatnonzero(length > 0.0)
-    a, b, c, normal, length, faces = (x[kept] for x in (a, b, c, normal, length, faces))
+    a, b, c, normal, length, faces = a[kept], b[kept], c[kept], normal[kept], length[kept], faces[kept]
     facing = np.abs(normal @ EYE) / length
     area = 0.5 * length * facing * scale**2
     count = np.ceil(DENSE * area * min(1.0, most / max(DENSE * float(area.sum()), 1.0))).astype(np.int64) + 1
