@@ -171,7 +171,7 @@ def test_the_path_is_coloured_by_tool(cut) -> None:
     choose(cut, "path coloured by", "tool")
     cut.locator(".cv-bar").get_by_text("T1", exact=True).wait_for()
     assert cut.locator(".cv-bar .cv-dot").count() >= 1
-    choose(cut, "path coloured by", "force")
+    choose(cut, "path coloured by", "force [N]")
 
 
 def test_a_result_without_samples_says_so(browser, served) -> None:
