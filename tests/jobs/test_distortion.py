@@ -79,6 +79,22 @@ def test_the_flattest_plan_is_used(chosen):
     assert json.dumps(result.operations[0])
 
 
+def test_the_report_draws_the_released_part(chosen):
+    """The flatness of the drawn underside, over its magnification, is that of the result."""
+    figures = {}
+    text = "".join(chosen.presentation.sections(figures))
+    assert 'id="shape"' in text
+    designed, released = figures["shape"].data
+    place, moved = (np.column_stack([t.x, t.y, t.z]).astype(float) for t in (designed, released))
+    times = float(released.name.rsplit(" ", 1)[1])
+    assert f"it is drawn {times:g} times as large" in text
+    # corners of triangles that look down, at the lowest height
+    rows = np.flatnonzero(np.repeat(chosen.outcome.surface.normals[:, 2] < -0.99, 3) & (np.abs(place[:, 2]) < 1e-9))
+    plane, rise = np.column_stack([np.ones(len(rows)), place[rows, :2]]), (moved - place)[rows, 2] / times
+    rest = rise - plane @ np.linalg.lstsq(plane, rise, rcond=None)[0]
+    assert np.ptp(rest) == pytest.approx(chosen.outcome.used.flatness.value, rel=1e-3)
+
+
 def test_what_is_not_in_the_model_is_said(chosen, folder):
     assert "limit distortion_um: not stated" in chosen.result.unchecked
     assert "milled-skin" not in [f.code for f in chosen.result.findings], "walls of 3 mm"

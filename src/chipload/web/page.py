@@ -16,7 +16,7 @@ from nicegui import background_tasks, ui
 from chipload.errors import InputError, OutputError
 from chipload.report.answer import STYLE as ANSWER_STYLE
 from chipload.report.folder import check_target
-from chipload.result import Verdict
+from chipload.result import Result, Verdict
 from chipload.result.changes import Change
 from chipload.web.asset_cache import AssetCache
 from chipload.web.comparison import MOST
@@ -35,7 +35,8 @@ from chipload.web.panels import RELEASE
 from chipload.web.panels.dropped import DropZone, Questions
 from chipload.web.panels.home import HomePanel
 from chipload.web.panels.job_form import JobForm
-from chipload.web.result import PageResult, open_result
+from chipload.web.panels.shape import ShapePanel
+from chipload.web.result import NoMotionError, PageResult, open_result
 from chipload.web.result_view import VERDICTS, ResultView
 from chipload.web.runs import JobRun
 
@@ -91,6 +92,7 @@ class Page:
             self.home = ui.element("div").classes("cl-home")
             with ui.element("div").classes("cl-view") as self.stage:
                 self.view = ResultView(assets)
+            self.shape = ShapePanel()
         self.view.moved_on = self._moved_on
         self.view.can_run = lambda: self._job_of_result() is not None
         self.view.run_change = self._try_change
@@ -125,6 +127,7 @@ class Page:
             result = await asyncio.to_thread(open_result, self.opened.root, name)
             self.result = result
             self.home.set_visibility(False)
+            self.shape.close()
             self.stage.set_visibility(True)
             title = result.result.title or "result"
             self.title.set_text(title)
@@ -138,12 +141,30 @@ class Page:
             ui.navigate.history.replace(f"/?show={quote(name)}")
             await self.view.open(result)
             await self._offer(name, result)
+        except NoMotionError as err:
+            self._show_shape(name, err.result)
         except InputError as err:
             ui.notify(str(err), type="negative")
             if self.result is None:
                 await self._home()
         finally:
             self.busy.set_visibility(False)
+
+    def _show_shape(self, name: str, result: Result) -> None:
+        """Show a result without a motion."""
+        self.result = None
+        self.home.set_visibility(False)
+        self.stage.set_visibility(False)
+        self.tracks.set_visibility(False)
+        self.others.set_visibility(False)
+        title = result.title or "result"
+        self.title.set_text(title)
+        ui.page_title(f"{result.verdict.value}: {title} - chipload")
+        self.name.set_text(self._folder_name(name))
+        self.report.set_visibility(True)
+        self.report.props(f'href="/report?name={quote(name)}"')
+        ui.navigate.history.replace(f"/?show={quote(name)}")
+        self.shape.open(result)
 
     # -- frame --------------------------------------------------------------------------------------------------
     def _header(self) -> None:
@@ -227,6 +248,7 @@ class Page:
         found, all_seen = await asyncio.to_thread(list_folder, self.opened.root)
         groups = await asyncio.to_thread(home_groups, self.opened.root, found)
         self.stage.set_visibility(False)
+        self.shape.close()
         self.home.set_visibility(True)
         self.home.clear()
         self.title.set_text("chipload")

@@ -34,6 +34,14 @@ KEPT = 24
 ROWS = 50_000_000
 
 
+class NoMotionError(InputError):
+    """A result has no row of a motion; ``result`` is what it has."""
+
+    def __init__(self, text: str, result: Result) -> None:
+        super().__init__(text)
+        self.result = result
+
+
 @dataclass(frozen=True, eq=False)
 class TextColumn:
     """A column of words: the code of each row, and what the codes mean."""
@@ -139,6 +147,8 @@ def open_result(root: Path, name: str) -> PageResult:
     ------
     InputError
         It is no result, or its history cannot be read.
+    NoMotionError
+        Its history has no place.
     """
     folder = resolve_name(root, name)
     models = {track.name: track for track in read_summary(folder).tracks}
@@ -160,7 +170,8 @@ def open_result(root: Path, name: str) -> PageResult:
     missing = [c for c in (*PLACE, "t_s", "s_mm") if c not in table.column_names]
     if missing or table.num_rows == 0 or sum(rows.values()) != table.num_rows:
         why = "no row" if not missing else f"no {missing[0]}"
-        raise InputError(f"{name}/{HISTORY}: {why}: nothing to show of its motion: open {name}/report.html")
+        text = f"{name}/{HISTORY}: {why}: nothing to show of its motion: open {name}/report.html"
+        raise NoMotionError(text, result)
     tracks, first = [], 0
     for track in result.tracks:
         if rows[track.name]:

@@ -9,11 +9,12 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from chipload.jobs.distortion.outcome import Banded, DistortionResult
-from chipload.jobs.distortion.result import UM, note
+from chipload.jobs.distortion.result import UM, note, shape_map
 from chipload.lazy import trimesh
 from chipload.number_text import number_text
 from chipload.report.presentation import Presentation
 from chipload.report.scene import WALL
+from chipload.report.shape_figure import shape_figure, shape_note
 from chipload.report.sheet import definitions, figure, table
 from chipload.result.style import FONT, GRID, INK
 
@@ -58,10 +59,14 @@ def sections(done: DistortionResult, figures: dict[str, go.Figure]) -> list[str]
         f"<p class='note'>The {LISTED} flattest of {len(done.others)} plans.</p>" if len(done.others) > LISTED else ""
     )
     faces = [[escape(name), _text(value), _range(value)] for name, value in done.used.faces.items()]
+    shape = shape_map(done)
     return [
         "<h2>Distortion after release</h2>",
         f"<p>{escape(note(done))}</p>",
         definitions(known),
+        "<h2>Shape after release</h2>",
+        f"<p>{escape(shape_note(shape))}</p>",
+        figure("shape", shape_figure(shape), figures),
         "<h2>Plans</h2>",
         "<p>Compared in wider cells; the plan in use is computed again in finer ones.</p>",
         table(head, rows, numbers=(2, 3, 4), used=used) + more,

@@ -29,7 +29,7 @@ def result_of(done: DistortionResult) -> Result:
         findings=done.findings,
         unchecked=tuple(f"limit {name}: not stated" for name in done.job.unchecked),
         provenance=done.provenance,
-        maps=(_map(done),),
+        maps=(shape_map(done),),
         note=note(done),
     )
 
@@ -66,7 +66,7 @@ def _check(done: DistortionResult, track: str, name: str, limit: float, value: B
     return LimitCheck(name, limit, worst, state, track, resolution_error=float(min(error, 1e6)), reason=reason)
 
 
-def _map(done: DistortionResult) -> SurfaceMap:
+def shape_map(done: DistortionResult) -> SurfaceMap:
     """Deviation of the surface, with its displacement over the best place of the part."""
     surface, moved = done.surface, done.used.moved
     faces = np.arange(len(surface.points)).reshape(-1, 3)
