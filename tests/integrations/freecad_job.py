@@ -30,7 +30,7 @@ def profile():
     job = CamJob.Create("Job", [box])
     controller = job.Tools.Group[0]
     controller.HorizFeed, controller.VertFeed, controller.SpindleSpeed = "600 mm/min", "200 mm/min", 6000
-    controller.Tool.Diameter = 6
+    controller.Tool.Diameter = controller.Tool.ShankDiameter = 6
     operation = CamProfile.Create("Profile", parentJob=job)
     operation.ToolController = controller
     document.recompute()
@@ -83,7 +83,8 @@ def main():
     out["not_a_setting"] = refused(job_folder.check, job, folder, command)
     job.ChiploadSettings = [
         "machine.name = vmc", "material.name = al6082-t6", "cutter.0.flutes = 3", "cutter.0.helix_deg = 35",
-        "cutter.0.overhang_mm = 35", "limits.force_n = 300", "operation.0.step_mm = 4",
+        "cutter.0.overhang_mm = 35", "cutter.0.runout_mm = 0", "limits.force_n = 300",
+        "operation.0.step_mm = 4",
     ]  # fmt: skip
     out["no_program"] = refused(job_folder.check, job, folder, "/nowhere/chipload")
     result = job_folder.check(job, folder, command)

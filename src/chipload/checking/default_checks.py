@@ -21,7 +21,7 @@ from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, Severity
 from chipload.machine.machine import Machine
 from chipload.number_text import number_text, percent_text
-from chipload.result import CoveredRows, LimitCheck, Verdict, check_limit, error_of
+from chipload.result import CoveredRows, LimitCheck, Verdict, check_limit, column_of, error_of
 from chipload.result.limits import Columns, hold_at_confidence
 from chipload.simulation.accuracy import AXIAL
 from chipload.simulation.chip_space import flute_fill
@@ -280,6 +280,35 @@ def _at_step(code: str, c: Columns, k: int, text: str) -> Finding:
     """A finding that leaves the result unproven, at a step."""
     place = (float(c["x_mm"][k]), float(c["y_mm"][k]), float(c["z_mm"][k]))
     return Finding(code, int(c["line"][k]) if "line" in c else 0, text, Severity.UNPROVEN, place, k)
+
+
+def stated_limits(
+    checks: DefaultChecks | None,
+    limits: Mapping[str, float],
+    columns: Columns,
+    track: str,
+    errors: Mapping[str, float],
+    rows: Mapping[str, CoveredRows] | None = None,
+) -> tuple[LimitCheck, ...]:
+    """Return the check of each limit that a job states, a load with the parts of its error.
+
+    Parameters
+    ----------
+    checks : of the loads; None: no coefficients are known, and no load is limited
+    limits : by name
+    columns : of the track, one row for each step
+    track : its name
+    errors : relative error of columns by the resolution
+    rows : that a limit covers, by its name; all steps where it is not among them
+    """
+    found = (
+        check_limit(
+            name, limit, columns, track=track, rows=(rows or {}).get(name),
+            error=error_of(column_of(name).name, errors),
+        )
+        for name, limit in limits.items()
+    )  # fmt: skip
+    return tuple(check if checks is None else with_budget(check, checks, columns) for check in found)
 
 
 def default_limits(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.checking.default_checks import DefaultChecks, default_limits, with_budget
+from chipload.checking.default_checks import DefaultChecks, default_limits, stated_limits
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.engagement.contact import PIECES, Engagement
@@ -23,7 +23,7 @@ from chipload.jobs.contour.outcome import PLANNED_ERRORS
 from chipload.jobs.contour.tables import OperationTable
 from chipload.machine.machine import Machine
 from chipload.planning.cost import CutConditions, cost
-from chipload.result import LimitCheck, Verdict, check_limit, column_of, error_of
+from chipload.result import LimitCheck, Verdict
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]
@@ -125,12 +125,7 @@ def _exceeded_limit(
         cost(cut, zone, zero, zero, np.zeros((PLACES, 2)), ahead, 0.0, engagement, np.full(PLACES, feed), wall)
     )
     columns["tool"] = np.full(PLACES, cut.cutter.number)
-    found = [
-        with_budget(
-            check_limit(name, limit, columns, error=error_of(column_of(name).name, PLANNED_ERRORS)), checks, columns
-        )
-        for name, limit in limits.items()
-        if name != "engagement_deg"
-    ]
+    own = {name: limit for name, limit in limits.items() if name != "engagement_deg"}
+    found = stated_limits(checks, own, columns, "", PLANNED_ERRORS)
     found += default_limits(checks, machine, columns, "", PLANNED_ERRORS)
     return next((c for c in found if c.state is not Verdict.HOLDS), None)

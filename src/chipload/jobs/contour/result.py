@@ -12,8 +12,8 @@ from chipload.checking.default_checks import (
     default_limits,
     ramp_findings,
     range_findings,
+    stated_limits,
     unchecked_checks,
-    with_budget,
 )
 from chipload.errors import Finding, Severity
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
@@ -28,9 +28,6 @@ from chipload.result import (
     Track,
     TrackKind,
     Verdict,
-    check_limit,
-    column_of,
-    error_of,
     in_memory,
 )
 from chipload.simulation.engagement_samples import EngagementSamples
@@ -92,17 +89,13 @@ def limits_of(machine: Machine, op: Operation, strategy: StrategyResult, track: 
     simulated = op.simulations.get(strategy.name)
     errors = {} if simulated is None else simulated.resolution_error
     wall = _wall_rows(op, strategy)
-    stated = tuple(
-        check_limit(
-            name, limit, columns, track=track, rows=wall if name in ON_WALL else None,
-            error=error_of(column_of(name).name, errors),
-        )
-        for name, limit in op.limits.items()
-    )  # fmt: skip
-    if op.checks is None:
+    rows = {} if wall is None else dict.fromkeys(ON_WALL, wall)
+    checks = op.checks
+    if checks is not None and simulated is not None:
+        checks = replace(checks, parts=simulated.load_parts)
+    stated = stated_limits(checks, op.limits, columns, track, errors, rows)
+    if checks is None:
         return stated
-    checks = op.checks if simulated is None else replace(op.checks, parts=simulated.load_parts)
-    stated = tuple(with_budget(check, checks, columns) for check in stated)
     return (*stated, *default_limits(checks, machine, columns, track, errors))
 
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chipload.checking.default_checks import default_limits, range_findings, unchecked_checks, with_budget
+from chipload.checking.default_checks import default_limits, range_findings, stated_limits, unchecked_checks
 from chipload.checking.result import holders_not_stated
 from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
@@ -37,9 +37,6 @@ from chipload.result import (
     Track,
     TrackKind,
     Verdict,
-    check_limit,
-    column_of,
-    error_of,
     in_memory,
     state_of,
 )
@@ -99,13 +96,11 @@ def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[Limi
     """
     compliance = outcome.wall.real.error if isinstance(outcome.wall, ClampedWorkpiece) else 0.0
     errors = errors_of(outcome.resolution_error, compliance)
-    stated = (
-        check_limit(name, limit, columns, track=track, error=error_of(column_of(name).name, errors))
-        for name, limit in outcome.job.limits.items()
-    )
     checks = outcome.job.checks
-    stated_checks = (with_budget(check, checks, columns) for check in stated)
-    found = (*stated_checks, *default_limits(checks, outcome.job.machine, columns, track, errors))
+    found = (
+        *stated_limits(checks, outcome.job.limits, columns, track, errors),
+        *default_limits(checks, outcome.job.machine, columns, track, errors),
+    )
     return tuple(over_allowable(x, columns, errors["torque_nm"]) if x.name == OVER else x for x in found)
 
 
