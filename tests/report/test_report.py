@@ -396,6 +396,30 @@ def test_only_the_program_in_use_that_holds_is_called_verified(outcome: Maker) -
         assert b"NOT VERIFIED: Unproven: a first result" in data or "backward" not in name
 
 
+def test_the_verdict_is_told_when_its_files_are_written_and_before_the_pictures_are_made(
+    outcome: Maker, tmp_path: Path
+) -> None:
+    made, told = outcome(), list[str]()
+    result, shown = result_of(made), presentation_of(made)
+
+    def verdict() -> None:
+        (fresh,) = tmp_path.iterdir()
+        told.extend(sorted(p.name for p in fresh.iterdir()))
+
+    def scene() -> bytes:
+        told.append("scene")
+        return shown.scene()
+
+    def blanks() -> Any:
+        told.append("blanks")
+        return shown.blanks()
+
+    presentation = replace(shown, scene=scene, blanks=blanks)
+    write_result(result, presentation, tmp_path / "result", verdict=verdict)
+    files = sorted(["history.parquet", "summary.json", *program_files(made, result)])
+    assert told == [*files, "blanks", "scene"]
+
+
 def test_the_folder_holds_everything(outcome: Maker, tmp_path: Path) -> None:
     made = outcome()
     target = write_result(result_of(made), presentation_of(made), tmp_path / "a" / "result")

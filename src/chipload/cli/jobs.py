@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +11,7 @@ import typer
 
 from chipload.cli.app import Accept, Debug, JobFile, Sets, app
 from chipload.cli.inputs import show_verdict
-from chipload.errors import Cancelled, InputError
+from chipload.errors import Cancelled, InputError, OutputError
 from chipload.number_text import number_text
 from chipload.terminal import bar, run_guarded, show, write_line
 
@@ -94,19 +95,33 @@ def run(
 
         where = None if workers is None and dask is None else Workers(1 if workers is None else workers, dask)
         check_target(out)
+        failed = list[Exception]()
         if not 0.0 <= keep_s < math.inf:
             raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")
         with Checkpoint(checkpoint_folder(out), keep_s, fresh=fresh, notice=write_line) as kept:
             try:
-                with bar(resume_note(loaded)) as progress:
+                with ExitStack() as bars:
+                    progress = bars.enter_context(bar(resume_note(loaded)))
                     done = run_job(
                         loaded, lambda part, what: progress(0.8 * part, what), kept,
                         accept=accept, workers=where,
                     )  # fmt: skip
                     done = mark_coarse(done) if coarse else done
+
+                    def verdict() -> None:
+                        """Show the verdict between two bars; the pictures are made afterwards, also if it was not."""
+                        nonlocal progress
+                        bars.close()
+                        try:
+                            show_verdict(done.result, worst=coarse)
+                        except (BrokenPipeError, OutputError) as err:
+                            failed.append(err)
+                        progress = bars.enter_context(bar())
+
                     target = write_finished(
-                        done.result, done.presentation, out, lambda part, what: progress(0.8 + 0.2 * part, what)
-                    )
+                        done.result, done.presentation, out,
+                        lambda part, what: progress(0.8 + 0.2 * part, what), verdict,
+                    )  # fmt: skip
             except (KeyboardInterrupt, Cancelled):
                 if not kept.what_is_kept():
                     raise
@@ -115,7 +130,8 @@ def run(
                     "--fresh it starts from the beginning"
                 ) from None
             kept.discard()
-        show_verdict(done.result, worst=coarse)
+        if failed:
+            raise failed[0]
         show(f"report: {target / 'report.html'}")
         return done.result.verdict.exit_code
 

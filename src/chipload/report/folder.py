@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import IO
 from chipload.errors import InputError, OutputError
 from chipload.files import HashingWriter, cannot_write, exchange_names, fresh_folder, read_regular, sweep
 from chipload.memory import return_free_memory
-from chipload.progress import Progress, silent
+from chipload.progress import Progress, part_of, silent
 from chipload.report.bodies import SceneBody
 from chipload.report.engagement import ENGAGEMENT, engagement_bytes
 from chipload.report.page import page_bytes
@@ -34,7 +34,10 @@ from chipload.simulation.checkpoint import require_ours
 #: [bytes]
 LARGEST_SUMMARY = 100_000_000
 #: files and who makes them
-Makers = list[tuple[str, Callable[[], Content]]]
+Maker = tuple[str, Callable[[], Content]]
+Makers = Sequence[Maker]
+#: share of the progress of a folder before the pictures
+FIRST = 0.3
 #: files that every result has
 NAMES = (SUMMARY, HISTORY, MAPS, REMOVAL, ENGAGEMENT, "scene.glb", "report.html")
 #: endings of programs and of further files
@@ -87,7 +90,13 @@ def checkpoint_folder(out: str | Path) -> Path:
     return folder
 
 
-def write_finished(result: Result, presentation: Presentation, out: str | Path, progress: Progress = silent) -> Path:
+def write_finished(
+    result: Result,
+    presentation: Presentation,
+    out: str | Path,
+    progress: Progress = silent,
+    verdict: Callable[[], None] | None = None,
+) -> Path:
     """Write the result of a run as :func:`write_result`; if the folder was filled meanwhile, the run's work is kept.
 
     Raises
@@ -96,13 +105,23 @@ def write_finished(result: Result, presentation: Presentation, out: str | Path, 
         The folder holds something else by now, or as :func:`write_result`.
     """
     try:
-        return write_result(result, presentation, out, progress)
+        return write_result(result, presentation, out, progress, verdict)
     except InputError as err:
         raise OutputError(f"{err}; the same command continues") from None
 
 
-def write_result(result: Result, presentation: Presentation, out: str | Path, progress: Progress = silent) -> Path:
-    """Write the folder of a result and return it: summary, history, maps, report, scene, programs.
+def write_result(
+    result: Result,
+    presentation: Presentation,
+    out: str | Path,
+    progress: Progress = silent,
+    verdict: Callable[[], None] | None = None,
+) -> Path:
+    """Write the folder of a result and return it: history, summary, maps, programs, then scene, report and stock.
+
+    Parameters
+    ----------
+    verdict : called when all that the verdict says is on the disk, before the pictures are made
 
     Raises
     ------
@@ -115,31 +134,40 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
     def history(file: IO[bytes]) -> None:
         rows.update(write_history(result, HashingWriter(file, digest)))
 
-    blanks, samples, bodies = presentation.blanks(), presentation.samples(), list[SceneBody]()
-    stocks = cache(lambda: removal_meshes(result, blanks))
-
-    def scene() -> bytes:
-        # the page needs some bodies of it, and a scene may be large: only they are kept
-        shown, glb = stocks(), presentation.scene()
-        bodies.extend(drawn_bodies(result, glb, shown))
-        return glb
-
-    def view() -> list[str]:
-        return view_section(result, tuple(bodies), stocks(), blanks, samples)
-
-    makers: Makers = [
+    makers: list[Maker] = [
         (HISTORY, lambda: history),
         (SUMMARY, lambda: summary_bytes(result, rows, digest.hexdigest())),
-        ("scene.glb", scene),
-        ("report.html", lambda: page_bytes(result, presentation, view())),
     ]
-    if blanks:
-        makers.append((REMOVAL, lambda: removal_bytes(result, stocks(), blanks)))
-    if samples:
-        makers.append((ENGAGEMENT, lambda: engagement_bytes(result, samples)))
     if result.maps:
         makers.append((MAPS, lambda: maps_bytes(result)))
-    return write_files(makers, out, lambda: presentation.files(result), progress=progress)
+
+    def pictures() -> Makers:
+        """Scene, report and what the page shows of the stock, which nothing of the verdict needs."""
+        blanks, samples, bodies = presentation.blanks(), presentation.samples(), list[SceneBody]()
+        stocks = cache(lambda: removal_meshes(result, blanks))
+
+        def scene() -> bytes:
+            # the page needs some bodies of it, and a scene may be large: only they are kept
+            shown, glb = stocks(), presentation.scene()
+            bodies.extend(drawn_bodies(result, glb, shown))
+            return glb
+
+        def view() -> list[str]:
+            return view_section(result, tuple(bodies), stocks(), blanks, samples)
+
+        makers: list[Maker] = [
+            ("scene.glb", scene),
+            ("report.html", lambda: page_bytes(result, presentation, view())),
+        ]
+        if blanks:
+            makers.append((REMOVAL, lambda: removal_bytes(result, stocks(), blanks)))
+        if samples:
+            makers.append((ENGAGEMENT, lambda: engagement_bytes(result, samples)))
+        return makers
+
+    return write_files(
+        makers, out, lambda: presentation.files(result), last=pictures, before_last=verdict, progress=progress
+    )  # fmt: skip
 
 
 def write_files(
@@ -147,6 +175,8 @@ def write_files(
     out: str | Path,
     more: Callable[[], Mapping[str, Content]] | None = None,
     *,
+    last: Callable[[], Makers] | None = None,
+    before_last: Callable[[], None] | None = None,
     ours: Callable[[Path], bool] | None = None,
     what: str = "result",
     progress: Progress = silent,
@@ -156,7 +186,8 @@ def write_files(
     Parameters
     ----------
     makers : names and who makes their content
-    more : further files, made last
+    more : further files, made after them
+    last : names and makers of files made after all others, asked for then; ``before_last`` is called before them
     ours, what : as in :func:`check_target`
 
     Raises
@@ -169,13 +200,14 @@ def write_files(
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with fresh_folder(target.parent) as fresh:
-            for k, (name, make) in enumerate(makers):
-                progress(k / (len(makers) + 1), name)
-                _write(fresh / name, make())
-                return_free_memory()
-            progress(len(makers) / (len(makers) + 1), "programs")
+            share = 1.0 if last is None else FIRST
+            _write_all(fresh, makers, part_of(progress, 0.0, share))
             for name, data in (more() if more is not None else {}).items():
                 _write(fresh / name, data)
+            if before_last is not None:
+                before_last()
+            if last is not None:
+                _write_all(fresh, last(), part_of(progress, share, 1.0))
             fresh.chmod(0o777 & ~_umask())
             _swap(fresh, target)
         progress(1.0, "written")
@@ -200,6 +232,14 @@ def _is_result(folder: Path) -> bool:
         )
     except (OSError, ValueError, RecursionError, InputError):
         return False
+
+
+def _write_all(folder: Path, makers: Makers, progress: Progress) -> None:
+    """Make files one after the other and write them."""
+    for k, (name, make) in enumerate(makers):
+        progress(k / len(makers), name)
+        _write(folder / name, make())
+        return_free_memory()
 
 
 def _write(path: Path, data: Content) -> None:
