@@ -5,7 +5,9 @@ Processor seconds, so that other work on the computer counts little; memory is t
 - `check` of an example, in a process of its own, its files compiled to byte code before;
 - jobs of a flat roughing and of a ball finishing program by the command line (reading, simulation, checks, report)
   over their kernel, contact and loads of the same moves, and the shares of reading, contact, loads, outlines, checks
-  and files in the same job within this process;
+  and files in the same job within this process; the processor seconds until the verdict is shown;
+- how much faster the kernel is on 2 and 4 threads with a core each: its processor time over that of its busiest thread
+  and of the main thread, which works for all (``--threads`` alone, with ``--moves``);
 - the exponent of time over the number of moves, and the memory of the longest job.
 
 ``--quick``: 1,000 and 5,000 moves, about a minute of processor time; start and report are then most of a job, and only
@@ -25,20 +27,24 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
+from unittest.mock import patch
 
 from engine_programs import made
 from engines import ALLOY
 
 from chipload import examples
 from chipload.jobs import load_job, run_job
+from chipload.simulation import strips
 from chipload.simulation.chips import remove
 from chipload.stock.layers import LayeredStock
 from simulation import RESOLUTION
 
 #: goals: check [s], a job over its kernel, memory of the longest job [MB]; by how much a goal may be missed
 CHECK_S, OVER_KERNEL, MEMORY_MB, MISSED = 0.4, 2.0, 400.0, 1.2
+NAMES = ("roughing", "finishing")
 QUICK, WHOLE = (1_000, 5_000), (10_000, 100_000)
 #: moves below which start and report are most of a job, so that no goal of time is stated
 SHORT = 50_000
@@ -104,8 +110,16 @@ class Row(NamedTuple):
         return self.found > MISSED * self.goal
 
 
-def command(words: Sequence[str], byte_code: str, codes: Sequence[int] = (0, 3)) -> tuple[float, float]:
-    """Processor seconds and greatest memory [MB] of a command of chipload, in a process of its own.
+class Spent(NamedTuple):
+    """Processor seconds and greatest memory [MB] of a command, and its processor seconds when it showed a line."""
+
+    seconds: float
+    memory: float
+    shown: float
+
+
+def command(words: Sequence[str], byte_code: str, codes: Sequence[int] = (0, 3)) -> Spent:
+    """What a command of chipload takes, in a process of its own.
 
     Parameters
     ----------
@@ -115,12 +129,18 @@ def command(words: Sequence[str], byte_code: str, codes: Sequence[int] = (0, 3))
     kept.pop("PYTHONDONTWRITEBYTECODE", None)
     told = Path(byte_code) / "memory"
     child = subprocess.Popen(
-        [sys.executable, "-c", TOLD, str(told), *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=kept
+        [sys.executable, "-c", TOLD, str(told), *words], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=kept
     )
+    assert child.stdout is not None
+    child.stdout.readline()
+    # user and system time so far, when the first line of the verdict is shown
+    ticks = Path(f"/proc/{child.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    child.stdout.read()
     _, status, used = os.wait4(child.pid, 0)
     if os.waitstatus_to_exitcode(status) not in codes:
         raise RuntimeError(f"chipload {' '.join(words)}: exit code {os.waitstatus_to_exitcode(status)}")
-    return used.ru_utime + used.ru_stime, float(told.read_text()) / 1024.0
+    shown = sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
+    return Spent(used.ru_utime + used.ru_stime, float(told.read_text()) / 1024.0, shown)
 
 
 def write_job(name: str, moves: int, folder: Path) -> Path:
@@ -136,15 +156,48 @@ def write_job(name: str, moves: int, folder: Path) -> Path:
     return folder / "job.toml"
 
 
-def kernel(name: str, moves: int) -> float:
+def kernel(name: str, moves: int, workers: int = 1) -> float:
     """Processor seconds of contact and loads of a program, without checks, errors and outlines."""
     case = made(name, moves)
     stock = LayeredStock.block(case.low, case.high, 4.0 * case.layer_mm, 40.0)
     begun = time.process_time()
     remove(
-        case.program, stock, case.cutters, ALLOY, RESOLUTION, engine="moves", accuracy=False, outlines=False, workers=1
+        case.program, stock, case.cutters, ALLOY, RESOLUTION, engine="moves", accuracy=False, outlines=False,
+        workers=workers,
     )  # fmt: skip
     return time.process_time() - begun
+
+
+class TimedThread(ThreadPoolExecutor):
+    """A thread of a simulation that states its processor seconds in ``times`` when it ends."""
+
+    times: ClassVar[list[float]] = []
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End it."""
+        if not self._shutdown:
+            self.times.append(self.submit(time.thread_time).result())
+        super().shutdown(wait, cancel_futures=cancel_futures)
+
+
+def thread_rows(name: str, moves: int) -> list[Row]:
+    """How much faster the kernel of a program is on several threads with a core each; the bytes are the same."""
+    kernel(name, 300)
+    alone, table = kernel(name, moves), list[Row]()
+    for workers in (2, 4):
+        TimedThread.times.clear()
+        with patch.object(strips, "ThreadPoolExecutor", TimedThread), patch.object(strips, "FEWEST", 1):
+            begun = time.thread_time()
+            kernel(name, moves, workers)
+            main = time.thread_time() - begun
+        work = f"{name}, {moves} moves, {len(TimedThread.times)} threads"
+        longest = max(TimedThread.times)
+        table += [
+            Row(f"{work}: kernel over its busiest thread", math.nan, alone / longest, "times"),
+            Row(f"{work}: over the busiest and the main thread", math.nan, alone / (longest + main), "times"),
+            Row(f"{work}: main thread", math.nan, main / alone, "of the kernel"),
+        ]
+    return table
 
 
 def shares(job: Path) -> dict[str, float]:
@@ -169,9 +222,9 @@ def measured(moves: Sequence[int], byte_code: str) -> list[Row]:
     """Every row of the table; the shares are printed as they are found."""
     check = ["check", str(Path(examples.__file__).parent / "feeds" / "job.toml")]
     command(check, byte_code)
-    seconds, memory = command(check, byte_code)
+    seconds, memory, _ = command(check, byte_code)
     table = [Row("check of the example feeds", CHECK_S, seconds, "s"), Row("its memory", math.nan, memory, "MB")]
-    for name in ("roughing", "finishing"):
+    for name in NAMES:
         kernel(name, 300)
         times = list[float]()
         for n in moves:
@@ -185,12 +238,13 @@ def measured(moves: Sequence[int], byte_code: str) -> list[Row]:
                 if name == "roughing" and n == moves[0]:
                     # writes the byte code
                     command(run, byte_code)
-                seconds, memory = command(run, byte_code)
+                seconds, memory, shown = command(run, byte_code)
             own = kernel(name, n)
             times.append(seconds)
             work, goal = f"{name}, {n} moves", OVER_KERNEL if n >= SHORT else math.nan
             table += [
                 Row(f"{work}: job", math.nan, seconds, "s"),
+                Row(f"{work}: of it until the verdict", math.nan, shown, "s"),
                 Row(f"{work}: kernel a move", math.nan, 1e6 * own / n, "us"),
                 Row(f"{work}: job over kernel", goal, seconds / own, "times"),
                 Row(f"{work}: memory", MEMORY_MB, memory, "MB"),
@@ -204,20 +258,30 @@ def measured(moves: Sequence[int], byte_code: str) -> list[Row]:
     return table
 
 
+def print_table(table: Sequence[Row]) -> None:
+    """Print the rows, and how busy the computer is."""
+    print("| work | goal | measured | |\n|---|---|---|---|")
+    for row in table:
+        goal = "" if math.isnan(row.goal) else f"{row.goal:.4g} {row.unit}"
+        print(f"| {row.work} | {goal} | {row.found:.4g} {row.unit} | {'missed' if row.missed() else ''} |")
+    print(f"load {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores")
+
+
 def main() -> None:
     """Print the table."""
     ask = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     ask.add_argument("--quick", action="store_true", help="few moves")
     ask.add_argument("--check", action="store_true", help="exit 1 where a goal is missed by more than 20 %%")
     ask.add_argument("--moves", type=int, nargs="+", default=None, help="lengths of the programs, ascending")
+    ask.add_argument("--threads", action="store_true", help="only the kernel on 2 and 4 threads")
     given = ask.parse_args()
+    if given.threads:
+        table = [row for n in given.moves or (20_000,) for name in NAMES for row in thread_rows(name, n)]
+        print_table(table)
+        return
     with tempfile.TemporaryDirectory() as byte_code:
         table = measured(given.moves or (QUICK if given.quick else WHOLE), byte_code)
-    print("| work | goal | measured | |\n|---|---|---|---|")
-    for row in table:
-        goal = "" if math.isnan(row.goal) else f"{row.goal:.4g} {row.unit}"
-        print(f"| {row.work} | {goal} | {row.found:.4g} {row.unit} | {'missed' if row.missed() else ''} |")
-    print(f"load {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores")
+    print_table(table)
     if given.check and any(row.missed() for row in table):
         sys.exit(1)
 

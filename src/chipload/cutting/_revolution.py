@@ -296,7 +296,8 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
     # where all teeth are alike each is the one before a pitch later, and a period of the pitch takes all in
     parts = teeth if alike else 1
     step = TAU / parts / count
-    known = -1
+    # typed: a literal would compile what it is passed to twice
+    known = np.int64(-1)
     for i in range(len(start) - 1):
         if known >= 0 and same(i, known, start, rows, tooth, piece, slices, frame, left):
             out[i] = out[known]

@@ -225,7 +225,7 @@ def engage(centres, headings, r, seg, box, first, last, angle, count, phi):
     n = len(seg)
     candidates = np.empty(n, dtype=np.int64)
     everything = np.arange(n)
-    kept = 0
+    kept = np.int64(0)
     anchor_x = math.inf
     anchor_y = math.inf
     reach = r * 0.25
@@ -239,7 +239,7 @@ def engage(centres, headings, r, seg, box, first, last, angle, count, phi):
         if not (abs(ox - anchor_x) < reach and abs(oy - anchor_y) < reach):
             anchor_x = ox
             anchor_y = oy
-            kept = 0
+            kept = np.int64(0)
             far = r * 1.001 + reach
             for i in range(n):
                 if box[i, 0] <= ox + far and box[i, 2] >= ox - far and box[i, 1] <= oy + far and box[i, 3] >= oy - far:

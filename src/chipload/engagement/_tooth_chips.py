@@ -173,8 +173,9 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
     line = np.empty((N + 2, 4))
     radii = np.zeros(N)
     cut = np.zeros((5, N, N, 3))
-    at = 0
-    known = -1
+    # typed: a literal would compile what it is passed to twice
+    at = np.int64(0)
+    known = np.int64(-1)
     for i in range(len(start) - 1):
         room[i] = at
         if known >= 0 and like(i, known, start, rows, tooth, piece, slices):
@@ -201,7 +202,7 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
                     fed = 1.0 if one else turns[j, 0]
                     at = put(
                         out, own, parent, before, at, rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3],
-                        fed * rows[r, 4], fed * offset, fed * rows[r, 6], 0.0, tooth[r] if one else j, r, 1,
+                        fed * rows[r, 4], fed * offset, fed * rows[r, 6], 0.0, tooth[r] if one else j, r, np.int64(1),
                     )  # fmt: skip
                 continue
             f = swing / sine

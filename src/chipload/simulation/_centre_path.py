@@ -240,7 +240,7 @@ def uncut_many(points, k, w, reach, mot, grid, rows, out):
     """:func:`uncut` for every point (m, 2) at its moment."""
     hint = np.full(1, -1, dtype=np.int64)
     for q in range(len(points)):
-        out[q] = uncut(points[q, 0], points[q, 1], k[q], w[q], reach, 0, 0.0, mot, grid, rows, hint)
+        out[q] = uncut(points[q, 0], points[q, 1], k[q], w[q], reach, np.int64(0), 0.0, mot, grid, rows, hint)
 
 
 @njit(cache=True, nogil=True)

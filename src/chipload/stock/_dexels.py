@@ -340,7 +340,7 @@ def cut(k, grid, tol, tips, axes, shape, ends, count):
                     los[n], his[n] = pierce(k, u, v, tips[n], axes[n], shape)
                 else:
                     los[n], his[n] = 1.0, 0.0
-            n = 0
+            n = np.int64(0)
             while n < m:
                 if los[n] > his[n]:
                     n += 1
@@ -414,8 +414,8 @@ def passage(k, u, v, ray, start, stop, los, his, tol, bends, tips, axes, shape, 
     if tb > ta:
         if lo > ends[ray, 0, 0]:
             t0, t1 = max(ta, a - 1.0), min(tb, a + 1.0)
-            lo = min(lo, deepest(k, u, v, t0, t1, 1, tol, tips, axes, shape, tip, axis))
+            lo = min(lo, deepest(k, u, v, t0, t1, np.int64(1), tol, tips, axes, shape, tip, axis))
         if hi < ends[ray, n - 1, 1]:
             t0, t1 = max(ta, b - 1.0), min(tb, b + 1.0)
-            hi = max(hi, -deepest(k, u, v, t0, t1, -1, tol, tips, axes, shape, tip, axis))
+            hi = max(hi, -deepest(k, u, v, t0, t1, np.int64(-1), tol, tips, axes, shape, tip, axis))
     return subtract(ray, lo, hi, ends, count)

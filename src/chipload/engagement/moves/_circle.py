@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from chipload.engagement.moves._border import border, ridge
@@ -48,7 +49,8 @@ def intervals(p, T, rho, z, low, high, end, apart, index, out, begin):
     s = math.sin(first)
     cd = math.cos(d)
     sd = math.sin(d)
-    before = AIR
+    # typed: a literal would compile what it is passed to twice
+    before = np.int64(AIR)
     inside = False
     c0 = c
     s0 = s

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from chipload.cutter.record import FLANK_LINE, FLAT
@@ -200,7 +201,8 @@ def slice_profile(p, c, near, count, u, parts, flank, levels, index, out):
         top = max(top, near[i, 4])
     outer = min(outer, c.wide)
     top = min(top, c.height)
-    k = 0
+    # typed: a literal would compile what it is passed to twice
+    k = np.int64(0)
     for i in range(c.count):
         if c.line[i] == FLANK_LINE:
             if outer >= c.rho[i] and top > c.z[i]:
@@ -324,7 +326,7 @@ def slice_flank(p, c, at, near, count, top, pieces, flank, levels, index, out, k
     :func:`slice_profile`.
     """
     index = borrow_arrays(index)
-    n = 2
+    n = np.int64(2)
     levels[0] = c.z[at]
     levels[1] = top
     many = False
@@ -345,7 +347,7 @@ def slice_flank(p, c, at, near, count, top, pieces, flank, levels, index, out, k
                 n += 1
     if many:
         # no level floors around: a surface that rises and falls
-        n = 2
+        n = np.int64(2)
     n, askew = floors_of_moves(p, c, at, near, count, top, levels, n, index)
     if many or c.run[at] > 0.0:
         # beside an upright wall the contact of a cone changes all along it

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from chipload.engagement.moves._circle import APART, intervals
@@ -95,8 +96,9 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
     # the flank is the last line of the profile
     line = c.count - 1
     along = c.s[line]
-    made = 0
-    used = 0
+    # typed: a literal would compile what it is passed to twice
+    made = np.int64(0)
+    used = np.int64(0)
     searches = 0
     # samples that wait above the one below, the next of them last
     top = len(held)
@@ -108,8 +110,8 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
     ask = low + near if askew else math.inf
     at_top = askew
     below = -1.0
-    begin = 0
-    many = 0
+    begin = np.int64(0)
+    many = np.int64(0)
     own = first
     middle = False
     while True:

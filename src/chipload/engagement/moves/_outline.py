@@ -23,7 +23,7 @@ HALVINGS = 14
 def was_swept(x, y, z, index, tops):
     """Whether a move swept a point of the body's box."""
     cell = place(x, y, index[0], index[1])
-    return cell >= 0 and swept_in(cell, x, y, z, index, tops, -1) != MATERIAL
+    return cell >= 0 and swept_in(cell, x, y, z, index, tops, np.int64(-1)) != MATERIAL
 
 
 @njit(cache=True, nogil=True)
@@ -110,7 +110,7 @@ def mark_nodes(z, xs, ys, index, tops, inside):
         column[j] = place(grid[0], ys[j], grid, index[1])
     for i in range(1, n - 1):
         row = place(xs[i], grid[1], grid, index[1])
-        hint = AIR
+        hint = np.int64(AIR)
         for j in range(1, m - 1):
             if row < 0 or column[j] < 0:
                 continue
