@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from chipload.engagement.bricks._index import solid, what_is
@@ -215,7 +216,7 @@ def intervals(ring, end, apart, index, wait, out):
     cd = math.cos(d)
     sd = math.sin(d)
     count = 0
-    before = AIR
+    before = np.int64(AIR)
     inside = False
     c0 = c
     s0 = s

@@ -234,7 +234,7 @@ def places(at, c, part, a, b, looks, known, index, wait, to, ring, front, spans,
         out[k, 6] = out[k, 0]
     inset = 1e-6 * (b - a)
     s0 = a
-    n0 = 0
+    n0 = np.int64(0)
     e0 = 0.0
     low = math.inf
     high = 0.0

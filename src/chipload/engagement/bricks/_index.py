@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit, types
 
 from chipload.engagement.bricks._sweep import A0, THETA, B, U, chord, nearest_time, swept, swept_share_of_ball
@@ -165,9 +166,9 @@ def enter(q, step, c, index, used, wait):
     """
     m = index[6][q]
     grid, shape, blocks, bricks, kept, alive = index[0], index[1], index[2], index[3], index[4], index[5]
-    i0, i1 = span(step, c, 0, grid[0], grid[3], shape[0])
-    j0, j1 = span(step, c, 1, grid[1], grid[4], shape[1])
-    k0, k1 = span(step, c, 2, grid[2], grid[5], shape[2])
+    i0, i1 = span(step, c, np.int64(0), grid[0], grid[3], shape[0])
+    j0, j1 = span(step, c, np.int64(1), grid[1], grid[4], shape[1])
+    k0, k1 = span(step, c, np.int64(2), grid[2], grid[5], shape[2])
     r = 0.5 * math.sqrt(grid[3] * grid[3] + grid[4] * grid[4] + grid[5] * grid[5])
     far = SIDE * r
     if i0 > i1 or j0 > j1 or k0 > k1:
