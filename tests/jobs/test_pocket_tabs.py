@@ -11,8 +11,8 @@ from chipload.program.program import ARC_CCW, ARC_CW, LINE
 from chipload.result import Verdict
 from pocket_job import SQUARE, checked, done, operation, swept, written
 
-RING = {"part": [[(0, 0), (32, 0), (32, 28), (0, 28)], [(10, 10), (22, 10), (22, 18), (10, 18)]]}
-TABS = "tabs = { at_mm = [[22.0, 13.0], [10.0, 15.0]], width_mm = 4.0, height_mm = 1.5 }"
+RING = {"part": [[(0, 0), (26, 0), (26, 22), (0, 22)], [(8, 8), (18, 8), (18, 14), (8, 14)]]}
+TABS = "tabs = { at_mm = [[18.0, 10.0], [8.0, 12.0]], width_mm = 4.0, height_mm = 1.5 }"
 
 
 def opened(shape, radius):
@@ -28,8 +28,8 @@ def opened(shape, radius):
 def test_tabs_hold_the_part(tmp_path, more):
     """Above 1.5 mm the ring is cleared, below the strips stay whole: areas of both heights, by polygons."""
     (pocket,), outcome = done(written(tmp_path, RING, operation(f"radial_depth_mm = 1.5\n{TABS}{more}", cutter=2)))
-    ring = shapely.difference(shapely.box(0, 0, 32, 28), shapely.box(10, 10, 22, 18))
-    strips = shapely.union(shapely.box(22, 11, 32, 15), shapely.box(0, 13, 10, 17))
+    ring = shapely.difference(shapely.box(0, 0, 26, 22), shapely.box(8, 8, 18, 14))
+    strips = shapely.union(shapely.box(18, 8, 26, 12), shapely.box(0, 10, 8, 14))
     below = swept(pocket.program, 2.5, -4.0)
     assert shapely.intersection(below, strips).area < 4e-2  # 1 um, the chords of this check, along 40 mm of edges
     assert below.area == pytest.approx(opened(shapely.difference(ring, strips), 2.5).area, rel=3e-3)
