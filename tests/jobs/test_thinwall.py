@@ -100,6 +100,8 @@ def test_variable_is_held_to_the_limit(finished, done, operation):
     c = variable.columns
     most = float((c["force_over_allowable"] * (1.0 + c["compliance_error"])).max())
     kept = most * (1.0 + variable.load_error["force_normal_n"]) <= 1.0
+    # without refinement the first plan that holds is taken: tests/jobs/test_thinwall_calibrated.py
+    assert done.settings["simulated_tries"] > 1
     assert kept or done.settings["simulated_tries"] == TRIES
     if variable.deflection > constant.deflection * (1.0 + 1e-9):
         assert f"bends the wall by {1e3 * constant.deflection:.4g} µm" in finished.result.note
@@ -311,12 +313,3 @@ def test_linuxcnc_reads_the_programs(done):
             assert len(moves) >= len(done.variants[name[2:-4]].program) - 2
             # rotary axes move
             assert len({words[4] for words in moves}) > 3
-
-
-def test_without_refinement_the_first_plan_that_holds_is_taken(tmp_path):
-    """The first plan holds and leaves a tenth of the limit unused; with refinement five are simulated."""
-    change = ("operation.0.least_error=false", "operation.0.compensate_um=0.0", "operation.0.refine=false")
-    path = copy_example("plate", tmp_path / "plate") / "job.toml"
-    quick = run_job(load_job(path, (*SMALL, *change, "limits.deflection_workpiece_um=46.0"))).outcome
-    assert quick.settings["simulated_tries"] == 1
-    assert quick.variants["variable"].over_with_error(modelled=True) < 0.95

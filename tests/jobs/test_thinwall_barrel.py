@@ -24,6 +24,7 @@ SMALL = (
     "operation.0.layer_mm=0.25",
     "operation.0.corner_slices=40",
     "operation.0.reserve=0.1",
+    "operation.0.refine=false",
     "operation.0.least_error=false",
     "operation.0.compensate_um=0.0",
     "limits.deflection_workpiece_um=80.0",

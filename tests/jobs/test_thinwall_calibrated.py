@@ -65,3 +65,5 @@ def test_one_side_is_cut_and_all_of_its_stock_taken(done):
         assert 0.96 * expected <= one.columns["chip_volume_mm3"].sum() <= 1.04 * taken
         assert one.plan.passes_otherwise is None
     assert done.variants["variable"].columns["force_over_allowable"].max() <= 1.01
+    # without refinement the first plan that holds is taken
+    assert done.settings["simulated_tries"] == 1
