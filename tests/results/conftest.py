@@ -119,7 +119,8 @@ def _run(name: str, out: Path) -> dict[str, Any]:
     def wide(blank: Any, path: Any, cutters: Any, before: Any, wider: float) -> Any:
         return shown(blank, path, cutters, before, wider * WIDER_OF.get(name, WIDER))
 
-    words = ["run", str(_job_file(name)), "--out", str(out)]
+    # nothing is kept on the way: what was made is compared when that has gone
+    words = ["run", str(_job_file(name)), "--out", str(out), "--keep-s", "86400"]
     words += [word for value in SHORTER.get(name, ()) for word in ("--set", value)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(folder_module, "write_result", kept)
