@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
+from chipload.program.build import plunge, rapid
 from chipload.program.program import LINE, RAPID, Program
 from chipload.simulation.chips import remove
 from chipload.simulation.removal import Resolution
@@ -53,3 +54,21 @@ def test_the_greatest_force_is_that_of_many_slices() -> None:
     error = np.abs(some["force_n"][cuts] / known["force_n"][cuts] - 1.0)
     assert np.percentile(error, 99) < 0.02
     assert some["torque_mean_nm"].sum() == pytest.approx(known["torque_mean_nm"].sum(), rel=2e-3)
+
+
+def test_a_corner_beside_a_cone() -> None:
+    """Slices of the cone after the corner have one normal: the borders of the corner go on over its own arc only."""
+    taper = Cutter(
+        6.0, 6, math.radians(28.0), 20.0, 35.0, 6e5, corner_radius=0.6, taper=math.radians(3.4), number=1
+    )  # fmt: skip
+    way = [(-8.0, 0.0, -0.87), (20.0, 0.0, -0.87)]
+    program = Program.join([rapid(way[:1], 300.0, 1, "link"), plunge(way[1:], 17.0, 300.0, 1, "cut")])
+    forces = []
+    for slices in (12, 96):
+        stock = LayeredStock.block((0.0, -2.985, -5.0), (30.0, 30.0, 0.0), 2.0, 32.0)
+        fine = Resolution(step_mm=2.0, tolerance=0.05, corner_slices=slices, flank_mm=48.0 / slices)
+        removal = remove(
+            program, stock, {1: taper}, material_named("al7075-t6"), fine, engine="moves", accuracy=False, workers=1
+        )
+        forces.append(float(np.max(removal.columns["force_n"])))
+    assert forces[0] == pytest.approx(forces[1], rel=0.02)

@@ -11,6 +11,7 @@ Oracle: :func:`chipload.cutting.force.forces_over_turn`, which integrates each r
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit, types
@@ -297,7 +298,7 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
     parts = teeth if alike else 1
     step = TAU / parts / count
     # typed: a literal would compile what it is passed to twice
-    known = np.int64(-1)
+    known: Any = np.int64(-1)
     for i in range(len(start) - 1):
         if known >= 0 and same(i, known, start, rows, tooth, piece, slices, frame, left):
             out[i] = out[known]

@@ -186,7 +186,8 @@ def learn_from_walls(
 def _relative(material: Material) -> Floats:
     """Return the relative standard deviation of each coefficient; 0 of one that is 0."""
     values = np.abs(np.array(material.coefficients))
-    return np.divide(np.sqrt(np.diagonal(material.variances)), values, out=np.zeros(6), where=values > 0.0)
+    relative: Floats = np.divide(np.sqrt(np.diagonal(material.variances)), values, out=np.zeros(6), where=values > 0.0)
+    return relative
 
 
 def _before(prior: Material, compliance_error: float, places: Sequence[float]) -> tuple[Floats, Floats]:
@@ -225,8 +226,8 @@ def _prediction(walls: Sequence[MeasuredWall], prior: Material, at: Floats) -> t
         slope[:, k] = (1.0 + at[6]) * (high - low) / (2.0 * STEP)
     slope[:, 6] = np.concatenate(middle)
     first = 0
-    for k, own in enumerate(middle):
-        slope[first : first + len(own), 8 + k] = 1.0
+    for number, own in enumerate(middle):
+        slope[first : first + len(own), 8 + number] = 1.0
         first += len(own)
     return (1.0 + at[6]) * np.concatenate(middle) + slope[:, 8:] @ at[8:], slope
 

@@ -9,6 +9,7 @@ Oracle: every slice against the paths of all earlier teeth by Newton's method, t
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -174,8 +175,8 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
     radii = np.zeros(N)
     cut = np.zeros((5, N, N, 3))
     # typed: a literal would compile what it is passed to twice
-    at = np.int64(0)
-    known = np.int64(-1)
+    at: Any = np.int64(0)
+    known: Any = np.int64(-1)
     for i in range(len(start) - 1):
         room[i] = at
         if known >= 0 and like(i, known, start, rows, tooth, piece, slices):

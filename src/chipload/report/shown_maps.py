@@ -23,7 +23,7 @@ class ShownMap:
 
     Parameters
     ----------
-    name, label, unit : of the map and its column
+    name, column : of the map, and what it shows
     points, faces, values : (n, 3) [mm], (m, 3), (n,); nan: not known
     low, high : ends of the scale
     limit : that the isolines stand for; None: none is stated
@@ -33,8 +33,7 @@ class ShownMap:
     """
 
     name: str
-    label: str
-    unit: str
+    column: str
     points: Floats
     faces: Ints
     values: Floats
@@ -45,6 +44,16 @@ class ShownMap:
     moved: Floats | None = None
     lines_moved: Floats | None = None
     tolerance: tuple[float | None, float | None] | None = None
+
+    @property
+    def label(self) -> str:
+        """Of its column."""
+        return COLUMNS[self.column].label
+
+    @property
+    def unit(self) -> str:
+        """Of its column."""
+        return COLUMNS[self.column].unit
 
 
 def isolines(faces: Ints, values: Floats, level: float, columns: Floats) -> Floats:
@@ -81,7 +90,7 @@ def shown_maps(result: Result, track: Track, bounds: Mapping[str, float]) -> tup
 
 
 def _show_map(one: SurfaceMap, bounds: Mapping[str, float]) -> ShownMap:
-    column, values = COLUMNS[one.column], np.asarray(one.values, dtype=np.float64)
+    values = np.asarray(one.values, dtype=np.float64)
     limit = bounds.get(one.column)
     finite = values[np.isfinite(values)]
     moved = None if one.displacement is None else np.asarray(one.displacement, dtype=np.float64)
@@ -89,7 +98,7 @@ def _show_map(one: SurfaceMap, bounds: Mapping[str, float]) -> ShownMap:
     found = [isolines(one.faces, values, level, both) for level in _levels(one.column, bounds)]
     lines = np.concatenate(found) if found else np.zeros((0, 2, both.shape[1]))
     return ShownMap(
-        one.name, column.label, column.unit, np.asarray(one.points, dtype=np.float64), one.faces, values,
+        one.name, one.column, np.asarray(one.points, dtype=np.float64), one.faces, values,
         float(finite.min()), float(finite.max()), limit, lines[..., :3], moved,
         None if moved is None else lines[..., 3:], tolerance_of(one.column, bounds),
     )  # fmt: skip

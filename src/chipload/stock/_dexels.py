@@ -335,11 +335,11 @@ def cut(k, grid, tol, tips, axes, shape, ends, count):
             if count[ray] == 0:
                 continue
             v = v0 + j * dv
-            for n in range(m):
-                if box[n, 0] <= u <= box[n, 1] and box[n, 2] <= v <= box[n, 3]:
-                    los[n], his[n] = pierce(k, u, v, tips[n], axes[n], shape)
+            for move in range(m):
+                if box[move, 0] <= u <= box[move, 1] and box[move, 2] <= v <= box[move, 3]:
+                    los[move], his[move] = pierce(k, u, v, tips[move], axes[move], shape)
                 else:
-                    los[n], his[n] = 1.0, 0.0
+                    los[move], his[move] = 1.0, 0.0
             n = np.int64(0)
             while n < m:
                 if los[n] > his[n]:

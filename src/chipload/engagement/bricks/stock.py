@@ -233,8 +233,8 @@ class BrickStock:
         of = np.repeat(np.arange(len(tool)), count)
         up = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
         tall = self.cutters["height"][[self.tools[n] for n in tool[of].tolist()]]
-        ends = (p[of] + (up * tall)[:, None] * a[of] for p, a in ((p0, a0), (p1, a1)))
-        return move_rows(*ends, a0[of], a1[of]), tool[of], np.where(up == 0, count[of], 0)
+        q0, q1 = (p[of] + (up * tall)[:, None] * a[of] for p, a in ((p0, a0), (p1, a1)))
+        return move_rows(q0, q1, a0[of], a1[of]), tool[of], np.where(up == 0, count[of], 0)
 
     def _work(self, pieces: int) -> tuple[NDArray[Any], ...]:
         wide = float(self.cutters["wide"].max())

@@ -10,6 +10,7 @@ Oracle: closed forms of flank cuts, in tests/engagement/moves.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -97,8 +98,8 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
     line = c.count - 1
     along = c.s[line]
     # typed: a literal would compile what it is passed to twice
-    made = np.int64(0)
-    used = np.int64(0)
+    made: Any = np.int64(0)
+    used: Any = np.int64(0)
     searches = 0
     # samples that wait above the one below, the next of them last
     top = len(held)
@@ -110,8 +111,8 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
     ask = low + near if askew else math.inf
     at_top = askew
     below = -1.0
-    begin = np.int64(0)
-    many = np.int64(0)
+    begin: Any = np.int64(0)
+    many: Any = np.int64(0)
     own = first
     middle = False
     while True:

@@ -36,22 +36,25 @@ def alone(piece, first, last, r):
     return (r == first or piece[r - 1] != piece[r]) and (r + 1 == last or piece[r + 1] != piece[r])
 
 
+@njit(cache=True, nogil=True, inline="always")
+def place_of(c, bow, slices, k):
+    """Place s of the circle of slice k on the arc ``bow``."""
+    return c.s[bow] + c.radius[bow] * (math.atan2(slices[k, 4], slices[k, 5]) - c.kappa[bow])
+
+
 @njit(cache=True, nogil=True)
-def follows(piece, slices, first, last, r):
-    """Whether rows r and r + 1 are the only ones of slices that follow one another."""
+def follows(c, bow, piece, slices, first, last, r):
+    """Whether rows r and r + 1 are the only ones of slices of the arc ``bow`` that follow one another."""
     return (
         first <= r
         and r + 1 < last
         and alone(piece, first, last, r)
         and alone(piece, first, last, r + 1)
         and abs(slices[piece[r], 1] - slices[piece[r + 1], 0]) < SAME
+        and arc_of(c, slices[piece[r], 0], slices[piece[r], 1]) == bow
+        and arc_of(c, slices[piece[r + 1], 0], slices[piece[r + 1], 1]) == bow
+        and abs(place_of(c, bow, slices, piece[r + 1]) - place_of(c, bow, slices, piece[r])) > SAME
     )
-
-
-@njit(cache=True, nogil=True, inline="always")
-def place_of(c, bow, slices, k):
-    """Place s of the circle of slice k on the arc ``bow``."""
-    return c.s[bow] + c.radius[bow] * (math.atan2(slices[k, 4], slices[k, 5]) - c.kappa[bow])
 
 
 @njit(cache=True, nogil=True)
@@ -146,15 +149,15 @@ def tooth_rows(entries, start, span, piece, slices, cutters, lead, hand, across,
             at = 0.5 * (s0 + s1)
             if bow >= 0:
                 at = place_of(c, bow, slices, k)
-                before = follows(piece, slices, first, last, r - 1)
-                after = follows(piece, slices, first, last, r)
+                before = follows(c, bow, piece, slices, first, last, r - 1)
+                after = follows(c, bow, piece, slices, first, last, r)
                 other = r - 1 if before else r + 1
                 third = -1
                 if before and after:
                     third = r + 1
-                elif after and follows(piece, slices, first, last, r + 1):
+                elif after and follows(c, bow, piece, slices, first, last, r + 1):
                     third = r + 2
-                elif before and follows(piece, slices, first, last, r - 2):
+                elif before and follows(c, bow, piece, slices, first, last, r - 2):
                     third = r - 2
                 if before or after:
                     x = place_of(c, bow, slices, piece[other]) - at
