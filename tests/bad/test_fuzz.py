@@ -23,6 +23,7 @@ from chipload.result.result import Provenance
 TOOL = Path(__file__).parents[2] / "tools" / "fuzz.py"
 sys.path.insert(0, str(TOOL.parent))
 
+import fuzz  # noqa: E402
 import fuzz_fork  # noqa: E402
 import fuzz_jobs  # noqa: E402
 import fuzz_readers  # noqa: E402
@@ -55,6 +56,13 @@ def test_a_history_without_times_is_refused(tmp_path: Path) -> None:
     table = pq.read_table(io.BytesIO(reader.seeds()[0]))
     pq.write_table(table.drop_columns(["t_s"]), tmp_path / "a.parquet")
     with pytest.raises(InputError, match=r"no t_s: nothing to show of its motion: open a-result/report\.html$"):
+        reader.read(tmp_path / "a.parquet")
+
+
+def test_a_history_with_names_in_no_encoding_is_refused(tmp_path: Path) -> None:
+    reader = fuzz_readers.READERS["parquet"]
+    (tmp_path / "a.parquet").write_bytes(fuzz.case_of("parquet", 25898, reader.seeds()))
+    with pytest.raises(InputError, match="cannot be read"):
         reader.read(tmp_path / "a.parquet")
 
 

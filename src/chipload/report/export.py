@@ -110,7 +110,7 @@ def _csv(history: Path, file: IO[bytes]) -> None:
                 file.write((",".join(f'"{name}"' for name in source.schema_arrow.names) + "\n").encode())
             else:
                 writer.close()
-    except pa.ArrowException as err:
+    except (pa.ArrowException, UnicodeDecodeError) as err:
         raise InputError(f"{history}: cannot be read: {err}: run the job again") from None
 
 

@@ -130,7 +130,7 @@ def _blocks(path: Path, first: int, count: int) -> Iterator[Columns]:
                 at += batch.num_rows
                 if low < high:
                     yield _columns(pa.Table.from_batches([batch.slice(low, high - low)]))
-    except (OSError, pa.ArrowException) as err:
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as err:
         raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
     if at < first + count:
         raise InputError(f"{path.name}: has {at} rows, the summary states {first + count}: run the job again")

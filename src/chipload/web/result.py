@@ -158,7 +158,7 @@ def open_result(root: Path, name: str) -> PageResult:
     try:
         found = pq.read_metadata(path)
         schema = pq.read_schema(path)
-    except (OSError, pa.ArrowException):
+    except (OSError, pa.ArrowException, UnicodeDecodeError):
         raise InputError(f"{name}/{HISTORY}: cannot be read: run the job again") from None
     if found.num_rows > ROWS:
         raise InputError(
@@ -191,7 +191,7 @@ def _drawable(kind: Any) -> bool:
 def _table(path: Path, names: list[str]) -> Any:
     try:
         return pq.read_table(path, columns=names)
-    except (OSError, pa.ArrowException) as err:
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as err:
         raise InputError(f"{path.name}: cannot be read: {err}") from None
 
 

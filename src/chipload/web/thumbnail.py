@@ -57,7 +57,7 @@ def thumbnail(root: Path, name: str) -> bytes:
     shown = _shown_track(summary)
     try:
         place, colours = _path(resolve_name(root, f"{name}/{HISTORY}"), summary, shown)
-    except (InputError, OSError, pa.ArrowException, KeyError):
+    except (InputError, OSError, pa.ArrowException, UnicodeDecodeError, KeyError):
         place, colours = np.zeros((0, 3)), np.zeros((0, 3))
     return png(picture(_bodies(root, name, shown), place, colours))
 
