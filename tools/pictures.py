@@ -187,11 +187,12 @@ def photograph_scene(chromium: Browser, folder: Path, name: str) -> None:
 def photograph_home(chromium: Browser, results: Path) -> None:
     """Write docs/page_home.png: the first page of a folder of results, those of :data:`HOME` that are there."""
     with tempfile.TemporaryDirectory() as above:
+        folder = Path(above) / "parts"
         for name in HOME:
             if (results / name / "summary.json").exists():
-                shutil.copytree(EXAMPLES / name, Path(above) / name)
-                shutil.copytree(results / name, Path(above) / name / "result")
-        with opened_page(chromium, Path(above), "", (1280, 640)) as page:
+                shutil.copytree(EXAMPLES / name, folder / name)
+                shutil.copytree(results / name, folder / name / "result")
+        with opened_page(chromium, folder, "", (1280, 640)) as page:
             page.wait_for_selector(".cl-result")
             page.evaluate("document.querySelectorAll('.cl-result img').forEach(i => { i.loading = 'eager'; })")
             page.wait_for_function("[...document.querySelectorAll('.cl-result img')].every(i => i.naturalWidth)")
