@@ -10,7 +10,6 @@ import typer
 from chipload.cli.app import Debug, MachineName, Sets, Tools, app
 from chipload.cli.inputs import show_verdict
 from chipload.errors import InputError
-from chipload.jobs.drafts.folder import RESULTS
 from chipload.terminal import bar, run_guarded, show
 
 File = Annotated[
@@ -66,6 +65,7 @@ def init(
         if folder is None:
             raise InputError(f"{file}: the folder is missing: use chipload init FILE DIR")
         from chipload.jobs.drafts.draft import write_drafts
+        from chipload.jobs.drafts.folder import RESULTS
         from chipload.jobs.drafts.make import drafts_of
         from chipload.jobs.drafts.questions import questions_of
 
