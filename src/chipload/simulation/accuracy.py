@@ -38,11 +38,11 @@ computed in any case.
 initial body. The step is computed with MORE times the slices and FINER times the rotations, once at the same
 instants, which gives f - c, and once in halves, which gives the loads above the worst. The contact is exact, so that a
 load that differs between the halves of a step, as where the cutter enters, is not an error of the resolution unless it
-exceeds every load of the run. FACTOR is :data:`MOVES_FACTOR` where the axis is upright: four times as many slices and
-rotations leave a quarter of a first order. FLOOR is :data:`MOVES_FLOOR`: with the difference of the two resolutions and
-what the chips leave out it holds the true loads of random cuts by all kinds of mills (benchmarks/truth.py,
-docs/design/engines.md). If all cutters have a straight flank and a flat bottom, on which slices are exact, it is
-:data:`FLAT_FLOOR`; if an axis leans, :data:`LEANING_MOVES_FLOOR`.
+exceeds every load of the run. FACTOR is :data:`MOVES_FACTOR` where the axis is upright, but for the chip: four times as
+many slices and rotations leave a quarter of a first order. FLOOR is :data:`MOVES_FLOOR`: with the difference of the two
+resolutions and what the chips leave out it holds the true loads of random cuts by all kinds of mills
+(benchmarks/truth.py, docs/design/engines.md). If all cutters have a straight flank and a flat bottom, on which slices
+are exact, it is :data:`FLAT_FLOOR`; if an axis leans, :data:`LEANING_MOVES_FLOOR`.
 
 **Chip.** To each error what the chips between the paths of the teeth leave out is added, of the steps that are computed
 a second time and have at least half of the worst load: :func:`chipload.engagement.tooth_surfaces.chip_error`. The
@@ -266,8 +266,9 @@ def resolution_error(
         alike, halves, some = again(window)
         _keep_worst(parts, int(window.own.tool[0]), some)
         by_heights = setting.moves is not None and setting.moves.upright
-        factor = MOVES_FACTOR if by_heights else window.factor
         for name in names:
+            # the thickest chip of a corner grows with the root of the height of a slice: its difference is doubled
+            factor = MOVES_FACTOR if by_heights and name != "chip_max_mm" else window.factor
             c, w = float(columns[name][step]), worst[name]
             same = alike.get(name, c)
             off = max(halves[name] - w, abs(same - c) if c >= 0.5 * w else same - w)
