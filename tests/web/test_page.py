@@ -131,7 +131,7 @@ def test_keys(square) -> None:
     page.evaluate("document.querySelector('[role=combobox][aria-label=\"path coloured by\"]').focus()")
     page.keyboard.press("ArrowDown")
     stands_at(page, 50)
-    help_text = page.get_by_text("one step back or forward")
+    help_text = page.get_by_text("one step back or forward; with Shift twenty", exact=True)
     assert not help_text.is_visible()
     page.keyboard.press("?")
     help_text.wait_for(state="visible")
