@@ -408,7 +408,7 @@ def learn_from_logs(
     """
     refuse_known_logs(prior, hashes)
     aligned: list[AlignedLog] = []
-    blocks: list[Any] = []
+    blocks: list[LogBlocks] = []
     cut = predicted.cut_seconds
     for key, log in logs.items():
         columns = {SignalKind.POWER: log.power, SignalKind.CURRENT: log.current, SignalKind.TORQUE: log.torque}

@@ -46,9 +46,9 @@ SHARE = 0.01
 #: radial depth
 LEAST, UNLIKE, SECOND, RUNOUT = 0.0025, 0.002, 0.75, 0.04
 #: the same where the surface leans, as that of a ball nose or a cone: at any cut, of the feed over the radius and of
-#: its square, which counts near a tip; with runout at any cut, of the runout over the greatest radial depth of the step
-#: and of its square: a longer tooth also cuts on parts of the edge that no circle reaches
-LEANS, NARROW, POINT, STANDS, TIP, BEYOND = 0.001, 0.05, 2.0, 0.002, 0.07, 2.5
+#: its square, which counts near a tip; of the runout over the greatest radial depth of the step and of its square: a
+#: longer tooth also cuts on parts of the edge that no circle reaches
+LEANS, NARROW, POINT, TIP, BEYOND = 0.002, 0.1, 10.0, 0.5, 4.0
 
 
 def tooth_radii(cutter: Cutter, lag: ArrayLike = 0.0) -> Floats:
@@ -166,8 +166,9 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     leave out: 0.0025 + 0.75 (f / R)^2 / phi_w + 0.04 e / max(ae, e), phi_w the engaged arc, ae its radial depth.
 
     With runout 0.002 is added. Where a range moves along the axis and leans, its chip is of first order in that motion:
-    f / R is added. A surface that leans has 0.001 + 0.05 f / R + 2 (f / R)^2 more, at most f / R; with
-    runout 0.002 + 0.07 x + 2.5 x^2, x = e / ae at most 1, ae the greatest radial depth of the step.
+    f / R is added. A surface that leans has 0.002 + 0.1 f / R + 10 (f / R)^2 more, at most f / R; for
+    0.75 (f / R)^2 / phi_w it has 0.75 (f / R / phi_w)^2, which counts in a thin contact. With runout it has
+    0.5 x + 4 x^2, x = e / ae at most 1, ae the greatest radial depth of the step.
     Ranges count by their share of the chip. 0 where nothing is cut.
 
     The constants are those within which random cuts by all kinds of mills lie (benchmarks/truth.py).
@@ -190,15 +191,16 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     share = np.minimum(np.divide(feed, rho, out=np.zeros(len(low)), where=turned), _tooth_chips.LARGE)
     e = cutter.runout[0] if cutter.flutes > 1 else 0.0
     leans = np.abs(cosine) > _tooth_chips.LEVEL
+    arc = np.where(turned, high - low, 1.0)
     each = LEAST + np.where(leans, LEANS + np.minimum(NARROW * share + POINT * share**2, share), 0.0)
-    each[turned] += SECOND * share[turned] ** 2 / (high - low)[turned]
+    each += SECOND * np.where(leans, np.minimum(share / arc, 1.0) ** 2, share**2 / arc)
     each += np.where(np.abs(offset) > _tooth_chips.LEVEL * swing, share, 0.0)
     if e > 0.0:
         each += UNLIKE + RUNOUT * e / np.maximum(depth, e)
         widest = np.zeros(len(front))
         np.maximum.at(widest, step, depth)
         x = e / np.maximum(widest[step], e)
-        each += np.where(leans, STANDS + TIP * x + BEYOND * x * x, 0.0)
+        each += np.where(leans, TIP * x + BEYOND * x * x, 0.0)
     weight = (swing + np.abs(offset)) * np.maximum(high - low, 1e-12) * (s1 - s0)
     whole = np.bincount(step, weight, len(front))
     return np.divide(np.bincount(step, weight * each, len(front)), whole, out=np.zeros(len(front)), where=whole > 0.0)

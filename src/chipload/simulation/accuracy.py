@@ -38,10 +38,9 @@ computed in any case.
 initial body. The step is computed with MORE times the slices and FINER times the rotations, once at the same
 instants, which gives f - c, and once in halves, which gives the loads above the worst. The contact is exact, so that a
 load that differs between the halves of a step, as where the cutter enters, is not an error of the resolution unless it
-exceeds every load of the run. FACTOR is :data:`MOVES_FACTOR` where the axis is upright, but for the chip: four times as
-many slices and rotations leave a quarter of a first order. FLOOR is :data:`MOVES_FLOOR`: with the difference of the two
-resolutions and what the chips leave out it holds the true loads of random cuts by all kinds of mills
-(benchmarks/truth.py, docs/design/engines.md). If all cutters have a straight flank and a flat bottom, on which slices
+exceeds every load of the run. FLOOR is :data:`MOVES_FLOOR`: with twice the difference of the two resolutions and what
+the chips leave out it holds the true loads of random cuts by all kinds of mills (benchmarks/truth.py,
+docs/design/engines.md). If all cutters have a straight flank and a flat bottom, on which slices
 are exact, it is :data:`FLAT_FLOOR`; if an axis leans, :data:`LEANING_MOVES_FLOOR`.
 
 **Chip.** To each error what the chips between the paths of the teeth leave out is added, of the steps that are computed
@@ -113,13 +112,13 @@ SHARE, LEAST = 0.05, 60
 MISSED_SHARE, MISSED_LEAST = 0.05, 1000
 #: least number of slices of the corner in the finer run
 FINE = 48
-#: factor on the difference of the two resolutions: upright axis by layers and by moves, leaning axis
-FACTOR, MOVES_FACTOR, LEANING = 2.0, 1.5, 3.0
+#: factor on the difference of the two resolutions: upright axis, leaning axis
+FACTOR, LEANING = 2.0, 3.0
 #: error that both resolutions share: upright axis, leaning axis
 FLOOR, LEANING_FLOOR = 0.01, 0.02
 #: by moves: error of a column that a few steps do not show
 MOVES_FLOOR = {
-    "force_n": 0.003, "torque_nm": 0.003, "torque_mean_nm": 0.003, "power_w": 0.003, "chip_max_mm": 0.035,
+    "force_n": 0.005, "torque_nm": 0.005, "torque_mean_nm": 0.005, "power_w": 0.005, "chip_max_mm": 0.035,
     "force_normal_n": 0.035, AXIAL: 0.035,
 }  # fmt: skip
 #: the same if all cutters are flat mills with a straight flank: slices are exact, and what is left are places between
@@ -265,14 +264,11 @@ def resolution_error(
             continue
         alike, halves, some = again(window)
         _keep_worst(parts, int(window.own.tool[0]), some)
-        by_heights = setting.moves is not None and setting.moves.upright
         for name in names:
-            # the thickest chip of a corner grows with the root of the height of a slice: its difference is doubled
-            factor = MOVES_FACTOR if by_heights and name != "chip_max_mm" else window.factor
             c, w = float(columns[name][step]), worst[name]
             same = alike.get(name, c)
             off = max(halves[name] - w, abs(same - c) if c >= 0.5 * w else same - w)
-            excess[name] = max(excess[name], factor * off)
+            excess[name] = max(excess[name], window.factor * off)
             if max(c, halves[name]) >= 0.5 * w:
                 chip[name] = max(chip[name], halves[CHIP])
     spent = 0

@@ -20,14 +20,12 @@ from typing import Any, NoReturn
 from chipload.errors import Cancelled, InputError, OutputError
 from chipload.files import cannot_write, is_full
 from chipload.progress import Progress, part_of
+from chipload.web.runs import DRAFT
 
 #: seconds between two lines of progress
 BREATH = 0.1
 #: set when the run is to stop: an interrupt within foreign code may be lost
 ASKED = threading.Event()
-
-
-DRAFT = "--draft"
 #: share of the progress that the coarse run is
 FIRST = 0.15
 
