@@ -16,6 +16,7 @@ from chipload.checking.inputs import CheckInputs
 from chipload.checking.leaning_stock import check_leaning_stock
 from chipload.checking.limits import GOUGE
 from chipload.checking.outcome import CollisionCheck, SimulationResult, StockCheck
+from chipload.checking.partial import PartialLimits
 from chipload.checking.preparation import Bodies, bodies_of, resolution_of, time_rows
 from chipload.checking.program_sequence import ProgramSequence
 from chipload.checking.stability import stability_of, watch_of
@@ -144,18 +145,21 @@ def simulate_program(
     def watch_all(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
         return {name: values for each in watches for name, values in each(cuts).items()}
 
-    removing = part_of(progress, SHARE, SHARE + 0.8)
+    partial = PartialLimits(inputs.limits.stated if inputs.loads else {})
+    removing = partial.with_text(part_of(progress, SHARE, SHARE + 0.8))
     if checkpoint is None:
         removal = remove(
             program, stock, cutters, material, fine, watch=watch_all, times=times,
-            loads=inputs.loads, outlines=inputs.outlines, workers=threads_of(workers), progress=removing,
+            loads=inputs.loads, outlines=inputs.outlines, workers=threads_of(workers), seen=partial.take,
+            progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
             program, stock, cutters, material, fine, checkpoint, watch=watch_all,
             keeps={"engagement": recorder} | ({} if stability_watch is None else {"watch": stability_watch}),
-            times=times, workers=threads_of(workers), progress=removing,
+            times=times, workers=threads_of(workers), seen=partial.take,
+            progress=removing,
             also=(
                 versions(), sources(), repr((stiffness, elasticity.workpiece)), repr(inputs.checks), formed,
                 None if stability_watch is None else stability_watch.dynamics,

@@ -61,7 +61,9 @@ from chipload.simulation.removal import (
     Resolution,
     RunningSums,
     RunSettings,
+    Seen,
     Watch,
+    unseen,
 )
 from chipload.simulation.steps import BLOCK, StepBlocks, Steps, moving_rows, number_of_steps, steps_in_blocks
 from chipload.simulation.strips import number_of_strips, remove_in_strips
@@ -93,6 +95,7 @@ def remove(
     engine: Engine = "moves",
     loads: bool = True,
     outlines: bool = True,
+    seen: Seen = unseen,
     progress: Progress = silent,
 ) -> Removal:
     """Remove the cuts of a program from ``stock``, which changes, and calculate the loads of every step.
@@ -115,6 +118,7 @@ def remove(
     loads : False: only what is removed is needed; moves then leave the loads 0
     outlines : False: of what is left only the volume is needed: moves then leave ``stock`` as it was, and its volume
         after them is that before less the chips
+    seen : takes the columns of each block of steps as soon as they are known
 
     Returns
     -------
@@ -150,6 +154,7 @@ def remove(
         kept, columns = dict[int, list[Cuts]](), list[Columns]()
         try:
             for sums, some, cuts in _blocks_removed(program, stock, begun, setting, times, count):
+                seen(some)
                 progress(sums.steps / count, "removing")
                 columns.append(some)
                 for engaged in cuts if keep else ():

@@ -37,7 +37,7 @@ from chipload.simulation.chips import (
     with_engine,
 )
 from chipload.simulation.moves import MaterialAboveFlutes
-from chipload.simulation.removal import Columns, Removal, Resolution, RunningSums, RunSettings, Watch
+from chipload.simulation.removal import Columns, Removal, Resolution, RunningSums, RunSettings, Seen, Watch, unseen
 from chipload.simulation.steps import BLOCK, steps_in_blocks
 from chipload.simulation.strips import remove_in_strips
 from chipload.stock.layers import LayeredStock
@@ -80,6 +80,7 @@ def remove_in_chunks(
     times: Floats | None = None,
     also: Any = (),
     workers: int = 2,
+    seen: Seen = unseen,
     progress: Progress = silent,
 ) -> Removal:
     """Do what :func:`chipload.simulation.chips.remove` does, with columns in files; continue a stopped run.
@@ -89,6 +90,7 @@ def remove_in_chunks(
     unfinished : the folder of the run; it holds the columns of the result, and stays until it is discarded
     keeps : states of ``watch`` beside its columns, by names of files
     times : as of :func:`chipload.simulation.chips.remove`
+    seen : as of :func:`chipload.simulation.chips.remove`; what was kept comes first
     also : values of any kind on which the result depends beside the arguments: versions, what ``watch`` uses
 
     Returns
@@ -124,14 +126,14 @@ def remove_in_chunks(
     if kept is not None:
         unfinished.notice(f"continues after step {sums.steps} of {count}, kept in {unfinished.folder}")
     try:
-        sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, progress)
+        sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, seen, progress)
     except MaterialAboveFlutes as found:
         unfinished.again(f"starts from the beginning, and asks for the shank in material: line {found.line}: {found}")
         setting = with_engine("moves", setting, program, stock, shank=True)
         sums = RunningSums(stock.volume(), shank=True)
         for state_of in keeps.values():
             state_of.clear()
-        sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, progress)
+        sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, seen, progress)
     if setting.moves is not None:
         setting.moves.finish(stock, setting.workers)
         return_free_memory()
@@ -149,6 +151,7 @@ def _remove_steps(
     count: int,
     times: Floats | None,
     keeps: Mapping[str, WatchState],
+    seen: Seen,
     progress: Progress,
 ) -> tuple[RunningSums, list[Columns]]:
     """Return the sums after all steps, and the columns that are not in files."""
@@ -165,11 +168,13 @@ def _remove_steps(
     )
     runs = runs_of_threads(program, stock, setting, count)
     if done:
+        seen(unfinished.columns())
         with ThreadPoolExecutor(max(len(runs), 1)) as pool:
             list(pool.map(lambda run: run.skip(program, resolution.step_mm, done), runs))
     for steps, moved in remove_in_strips(blocks, setting, runs, done):
         progress(sums.steps / count, "removing")
         sums, some, _ = remove_block(steps, stock, sums, setting, moved)
+        seen(some)
         columns.append(some)
         waiting += len(steps)
         now = time.monotonic()

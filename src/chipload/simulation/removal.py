@@ -26,6 +26,8 @@ Columns = Mapping[str, NDArray[Any]]
 
 #: more columns of steps that cut
 Watch = Callable[[Cuts], Mapping[str, Floats]]
+#: takes the columns of a block of steps
+Seen = Callable[[Columns], None]
 
 #: columns that have a band, and the column of its standard deviation; linear in the force are those of ``force_sd_n``
 BANDED = {
@@ -38,6 +40,10 @@ BANDED = {
     "form_error_um": "force_sd_n",
     "cutter_stress_mpa": "force_sd_n",
 }
+
+
+def unseen(columns: Columns) -> None:
+    """Take the columns of a block and do nothing: the default of every ``seen=`` argument."""
 
 
 @dataclass(frozen=True)
