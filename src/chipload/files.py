@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import difflib
 import errno
 import hashlib
 import io
@@ -67,6 +68,17 @@ def require_utf8(path: Path) -> None:
             raise InputError(f"{name!a}: this name is not UTF-8, and a result cannot state it: rename it") from None
 
 
+def near_name(path: str | Path) -> str:
+    """The name of the file of the same folder and ending that is most similar to a missing one; empty: none is."""
+    missing = Path(path)
+    try:
+        names = [entry.name for entry in os.scandir(missing.absolute().parent) if entry.is_file()]
+    except (OSError, ValueError):
+        return ""
+    stems = {Path(name).stem: name for name in names if Path(name).suffix.lower() == missing.suffix.lower()}
+    return next((stems[stem] for stem in difflib.get_close_matches(missing.stem, stems, 1)), "")
+
+
 @contextmanager
 def open_regular(path: str | Path, label: str, most: int, remedy: str = "split it") -> Iterator[IO[bytes]]:
     """A regular file of at most ``most`` bytes, opened for reading; it never waits for a pipe or a device.
@@ -93,7 +105,9 @@ def open_regular(path: str | Path, label: str, most: int, remedy: str = "split i
                 raise InputError(f"{label}: {found.st_size} bytes: must be at most {most} bytes: {remedy}")
             yield file
     except OSError as err:
-        raise InputError(f"{label}: cannot be read: {err.strerror or err}") from None
+        near = near_name(path) if err.errno == errno.ENOENT else ""
+        meant = f": did you mean {near}?" if near else ""
+        raise InputError(f"{label}: cannot be read: {err.strerror or err}{meant}") from None
     except ValueError as err:
         if "null" not in str(err):
             raise

@@ -37,7 +37,8 @@ BY_SET = {
     "operation=[]": "operation: has no entry: state at least one [[operation]]",
     "stock=3": "stock = 3: must be a table, [stock]",
     "part.file=": "part.file = '': must not be empty",
-    "part.units=inches": "part.units = 'inches': must be one of 'um', 'mm', 'cm', 'm', 'inch', 'foot'",
+    "part.units=inches": "part.units = 'inches': must be one of 'um', 'mm', 'cm', 'm', 'inch', 'foot': did you mean "
+    "inch?",
     "limits.engagement_deg=0": "limits.engagement_deg = 0: must be above 0 (greatest engagement angle)",
     "operation.0.feed_mm_min=1"
     + "0" * 400: "operation.0.feed_mm_min: a number is too large: a whole number must be within 9223372036854775807",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -202,3 +203,65 @@ def test_a_wall_that_does_not_carry_the_smallest_depth(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, [*words, "--set", "limits.deflection_workpiece_um=0.05"])
     assert done.exit_code == 3
     assert "the limit cannot be kept at" in done.output
+
+
+def test_check_lists_every_name_and_file_that_is_wrong(tmp_path: Path) -> None:
+    """Where keys are wrong too, and where nothing else is; near names are proposed."""
+    with resources.as_file(resources.files(examples) / "bracket") as source:
+        shutil.copytree(source, tmp_path / "job")
+    job = tmp_path / "job" / "job.toml"
+    right = job.read_text()
+    wrong = {
+        '"vmc-fanuc"': ('"vcm-fanuc"', "machine vcm-fanuc: not known: the nearest is vmc-fanuc"),
+        '"bracket.nc"': ('"brackt.nc"', "program.file = brackt.nc: no such file: did you mean bracket.nc?"),
+        '"clamp.stl"': ('"clam.stl"', "fixture.0.file = clam.stl: no such file: did you mean clamp.stl?"),
+        '"part.stl"': ('"zzz.stl"', "part.file = zzz.stl: no such file: is not in job"),
+    }
+    text = right
+    for old, (new, _) in wrong.items():
+        text = text.replace(old, new)
+    for keys in (False, True):
+        job.write_text(text.replace("spacing_mm", "spacng_mm") if keys else text)
+        code, _, said = call("check", job)
+        lines = said.splitlines()
+        assert code == 2
+        for _, expected in wrong.values():
+            assert sum(line.startswith(f"chipload: job.toml: {expected}") for line in lines) == 1, expected
+        assert len(lines) == len(wrong) + 2 * keys
+    assert "job.toml: part.spacng_mm: unknown key; did you mean spacing_mm?" in said
+
+
+def test_a_mistyped_file_word_or_name_is_named_as_such(tmp_path: Path) -> None:
+    with resources.as_file(resources.files(examples) / "contour") as source:
+        shutil.copytree(source, tmp_path / "job")
+    job = tmp_path / "job" / "job.toml"
+    for words, expected in (
+        (
+            ("run", job.with_name("jbo.toml"), "--out", tmp_path / "r"),
+            "No such file or directory: did you mean job.toml?",
+        ),
+        (
+            ("check", job, "--set", "operation.0.kind=contur"),
+            "must be one of 'contour', 'forward', 'pocket': did you mean contour?",
+        ),
+        (("example", "contuor", tmp_path / "c"), "example contuor: not known; did you mean contour?"),
+        (("machines", "tormach-400"), "the nearest is tormach-440"),
+    ):
+        code, _, said = call(*words)
+        assert (code, expected in said) == (2, True), said
+    code, _, said = call("chek", job)
+    assert code == 2
+    assert "No such command 'chek'. Did you mean 'check'" in said
+
+
+def test_the_shell_completes_names() -> None:
+    for line, names in (
+        ("chipload example co", {"cone", "contour"}),
+        ("chipload machines tormach-4", {"tormach-440"}),
+        ("chipload materials al6082", {"al6082-t6"}),
+        ("chipload check a.nc --control hei", {"heidenhain"}),
+        ("chipload simulate a.nc --machine vmc-l", {"vmc-light"}),
+    ):
+        words = {"_CHIPLOAD_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(line.split()) - 1)}
+        done = CliRunner().invoke(app, [], prog_name="chipload", env=words)
+        assert set(done.output.split()) == names, line

@@ -38,11 +38,13 @@ def test_a_table_of_numbers_is_no_program(tmp_path: Path) -> None:
 
 
 def test_a_mesh_is_named_as_one(tmp_path: Path) -> None:
-    path = tmp_path / "part.STL"
-    path.write_text("solid part\nendsolid part\n")
+    path = tmp_path / "part.3mf"
+    path.write_text("part\n")
     code, _, said = call("init", path, tmp_path / "job")
     assert code == 2
-    assert said.startswith(f"chipload: {path}: a mesh has no faces or contours to plan from: export STEP or DXF")
+    assert said.startswith(
+        f"chipload: {path}: a mesh of this kind has no faces or contours to plan from: export STEP or DXF"
+    )
 
 
 def test_a_program_without_known_motion_is_refused(tmp_path: Path) -> None:

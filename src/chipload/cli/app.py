@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from chipload.cli.completion import control_completions, machine_completions
 from chipload.terminal import show
 
 app = typer.Typer(
@@ -30,7 +31,13 @@ Sets = Annotated[
     ),
 ]
 MachineName = Annotated[
-    str | None, typer.Option("--machine", metavar="MACHINE", help="a shipped machine, or a file (.toml, LinuxCNC .ini)")
+    str | None,
+    typer.Option(
+        "--machine",
+        metavar="MACHINE",
+        help="a shipped machine, or a file (.toml, LinuxCNC .ini)",
+        autocompletion=machine_completions,
+    ),
 ]
 Tools = Annotated[
     Path | None,
@@ -46,7 +53,11 @@ DialectName = Annotated[
 ]
 ControlName = Annotated[
     str | None,
-    typer.Option("--control", help="control of the program, e.g. haas or fanuc; default: by what the program shows"),
+    typer.Option(
+        "--control",
+        help="control of the program, e.g. haas or fanuc; default: by what the program shows",
+        autocompletion=control_completions,
+    ),
 ]
 UnitName = Annotated[
     str | None, typer.Option("--unit", help="mm or inch: lengths before the program states a unit (G20, G21)")

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import Debug, MachineName, Sets, Tools, app
+from chipload.cli.completion import machine_completions
 from chipload.cli.inputs import show_verdict
 from chipload.errors import InputError
 from chipload.terminal import bar, run_guarded, show
@@ -15,7 +16,8 @@ from chipload.terminal import bar, run_guarded, show
 File = Annotated[
     Path,
     typer.Argument(
-        metavar="FILE", help="NC program, CL data, CAMotics project, DXF, STEP, FreeCAD document, or blade sections"
+        metavar="FILE",
+        help="NC program, CL data, CAMotics project, DXF, STEP, STL, FreeCAD document, or blade sections",
     ),
 ]
 Looked = Annotated[Path, typer.Argument(metavar="FILE", help="a file that init accepts, or the job.toml that it wrote")]
@@ -23,7 +25,12 @@ Looked = Annotated[Path, typer.Argument(metavar="FILE", help="a file that init a
 
 MachineOf = Annotated[
     str | None,
-    typer.Option("--on", metavar="MACHINE", help="a shipped machine, or a file (.toml); default: a guess"),
+    typer.Option(
+        "--on",
+        metavar="MACHINE",
+        help="a shipped machine, or a file (.toml); default: a guess",
+        autocompletion=machine_completions,
+    ),
 ]
 
 

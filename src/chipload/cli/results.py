@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import Debug, app
+from chipload.cli.completion import example_completions
 from chipload.errors import InputError
 from chipload.terminal import run_guarded, show
 
@@ -17,7 +18,10 @@ DEMO = ("contour", "pocket", "chips")
 
 @app.command()
 def example(
-    name: Annotated[str | None, typer.Argument(help="name of the example; default: list all")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(help="name of the example; default: list all", autocompletion=example_completions),
+    ] = None,
     folder: Annotated[Path | None, typer.Argument(metavar="DIR", help="folder for the copy")] = None,
     debug: Debug = False,
 ) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chipload.cli.app import Debug, app
+from chipload.cli.completion import machine_completions, material_completions
 from chipload.terminal import plain, run_guarded, show
 
 if TYPE_CHECKING:
@@ -19,14 +20,22 @@ FEW = 3
 
 
 @app.command()
-def machines(debug: Debug = False) -> None:
+def machines(
+    name: Annotated[str, typer.Argument(help="machine to show in full", autocompletion=machine_completions)] = "",
+    debug: Debug = False,
+) -> None:
     """List the machines that come with chipload: axes, travel, feed, spindle, source of the numbers."""
-    run_guarded(lambda: _show_entry("machines"), debug)
+    run_guarded(lambda: _shown_machine(name) if name else _show_entry("machines"), debug)
 
 
 @app.command()
 def materials(
-    name: Annotated[str, typer.Argument(help="material to show in full: what each check proves with it")] = "",
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="material to show in full: what each check proves with it", autocompletion=material_completions
+        ),
+    ] = "",
     debug: Debug = False,
 ) -> None:
     """List the materials that come with chipload: coefficients, range, spread, what they prove, source."""
@@ -43,6 +52,20 @@ def cutters(debug: Debug = False) -> None:
 def examples(debug: Debug = False) -> None:
     """List the examples. `chipload example NAME DIR` copies one."""
     run_guarded(lambda: _show_entry("examples"), debug)
+
+
+def _shown_machine(name: str) -> int:
+    """Show every number of a machine, a line each, with the whole source."""
+    from chipload.jobs.shipped import machines as listing_of
+    from chipload.machine.machine import machine_named
+
+    listing, known = listing_of(), machine_named(name)
+    row = next(row for row in listing.rows if row[0] == known.name)
+    for head, cell in zip(listing.head, row, strict=True):
+        label, _, unit = head.partition(" [")
+        if cell:
+            show(f"{label}: {cell}{f' {unit[:-1]}' if unit else ''}")
+    return 0
 
 
 def _shown_material(name: str) -> int:

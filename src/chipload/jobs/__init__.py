@@ -24,7 +24,7 @@ from chipload.files import read_regular, require_utf8
 from chipload.jobs.confirm import guesses_of, take_confirm
 from chipload.jobs.messages import Errors, left_missing, renamed_tables, table_errors
 from chipload.jobs.override import override
-from chipload.jobs.sources import cutter_errors, entries_of, source_errors
+from chipload.jobs.sources import cutter_errors, entries_of, named_errors, source_errors
 from chipload.progress import Progress, silent
 from chipload.tables import LARGEST_FILE, parse_toml, require_sound
 from chipload.workers import Workers
@@ -223,6 +223,8 @@ def _load_tables(
         for text in (*module.missing_keys(raw), *source_errors(raw, root), *cutter_errors(raw, path.parent)):
             if text.split(": ")[0] not in misspelt:
                 errors.add(text)
+        for text in named_errors(raw, path.parent):
+            errors.add(text)
     except OverflowError:
         errors.add("a number is too large: write it below 1e300")
     errors.refuse(f"{label}: ")
@@ -305,9 +307,21 @@ def check_job(loaded: LoadedJob) -> tuple[list[str], bool]:
     Raises
     ------
     InputError
-        As :func:`run_job`.
+        As :func:`run_job`: a line for each file and name that cannot be used.
     """
-    lines, holds = loaded.capability.module("run").check(loaded.job)
+    try:
+        lines, holds = loaded.capability.module("run").check(loaded.job)
+    except InputError as err:
+        # the first that cannot be read ends the reading: the others are named too
+        errors = Errors()
+        for text in named_errors(loaded.job.table.model_dump(), loaded.job.path.parent):
+            errors.add(text)
+        first = [str(text) for text in err.args]
+        known = any("cannot be read" in text or text in errors.texts for text in first)
+        errors.texts = errors.texts if known else [*first, *errors.texts]
+        if len(errors.texts) > 1:
+            errors.refuse(f"{loaded.source.partition(' sha256 ')[0]}: ")
+        raise
     if loaded.guesses:
         lines, holds = [*(f"guess: {text}" for text in loaded.guesses), *lines, unconfirmed_text(loaded)], False
     return lines, holds

@@ -11,8 +11,10 @@ from pydantic import BaseModel, ValidationError
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import CutterTable
 from chipload.errors import InputError
+from chipload.files import near_name
 from chipload.jobs.messages import Errors
 from chipload.jobs.tables import SourceTable
+from chipload.tables import shipped_table
 from chipload.units import rpm_from_rad_s
 
 
@@ -161,6 +163,44 @@ def source_errors(raw: Mapping[str, Any], root: type[BaseModel]) -> list[str]:
             if len(stated) != 1:
                 found.append(_one_source(key, bool(stated)))
     return found
+
+
+def named_errors(values: Mapping[str, Any], folder: Path) -> list[str]:
+    """What is wrong with the names and the files that the tables of a job state: shipped things that are not known,
+    files that are not there.
+
+    Parameters
+    ----------
+    values : of a job file, or of its tables
+    folder : that file names are relative to
+    """
+    errors = Errors()
+    for kind in ("machine", "material", "catalogue"):
+        table = values.get(kind)
+        name = table.get("name") if isinstance(table, Mapping) and table.get("file") is None else None
+        if isinstance(name, str):
+            with errors.collect():
+                shipped_table(kind, name)
+    for key, file in _files_of(values):
+        if not (folder / file).exists():
+            near = near_name(folder / file)
+            meant = f": did you mean {near}?" if near else f": is not in {folder.name or folder}"
+            errors.add(f"{key} = {file}: no such file{meant}")
+    return errors.texts
+
+
+def _files_of(values: Any, key: str = "") -> Iterator[tuple[str, str]]:
+    """The keys `file` of tables within one another, with their values."""
+    if isinstance(values, (list, tuple)):
+        for k, one in enumerate(values):
+            yield from _files_of(one, f"{key}.{k}")
+    elif isinstance(values, Mapping):
+        for name, one in values.items():
+            place = f"{key}.{name}" if key else str(name)
+            if name == "file" and isinstance(one, str) and one:
+                yield place, one
+            else:
+                yield from _files_of(one, place)
 
 
 class Limited:

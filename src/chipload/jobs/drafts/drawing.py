@@ -75,7 +75,7 @@ def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft
     notes = tuple(str(f) for f in drawing.findings[:8])
     if all(c.closed for c in contours):
         size, region, narrow = cutter_for(contours)
-        rest = planned_tables(on, machine, size, _axial(size), "pocket", narrow=narrow)
+        rest = planned_tables(on, machine, size, axial_depth(size), "pocket", narrow=narrow)
         if len(contours) > 1:
             notes = (f"{len(contours)} closed contours: {NESTED}", *notes)
         return Draft(
@@ -84,7 +84,7 @@ def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft
             notes,
         )
     size, side = _side_of(contours)
-    rest = planned_tables(on, machine, size, _axial(size), "contour", side)
+    rest = planned_tables(on, machine, size, axial_depth(size), "contour", side)
     return Draft(f"Finish the contours of {file.name} at limited engagement.", (*tables, *rest), notes)
 
 
@@ -197,7 +197,7 @@ def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
     if not floors:
         raise InputError(f"{file.name}: no horizontal face whose edges close: turn the part, or draw it as DXF")
     level, drawing, size, region, narrow = floors[0]
-    axial = min(_axial(size), top - level) if top - level > 1e-3 else _axial(size)
+    axial = min(axial_depth(size), top - level) if top - level > 1e-3 else axial_depth(size)
     others = ", ".join(f"{z:g}" for z in sorted({round(float(f.low[2]), 3) for f in planes}, reverse=True)[:12])
     part = DraftTable(
         "part",
@@ -332,7 +332,7 @@ def _narrow(area: Any, d: float) -> bool:
     return len(shapely.get_parts(apart)) > len(shapely.get_parts(centres))
 
 
-def _axial(d: float) -> float:
+def axial_depth(d: float) -> float:
     """Axial depth [mm] of a cutter of diameter d [mm]."""
     return (AXIAL if d > SMALL else AXIAL_SMALL) * d
 

@@ -19,7 +19,7 @@ def draft_of(
 
     Parameters
     ----------
-    file : NC text, CL data, a CAMotics project, DXF, STEP, FreeCAD document or blade sections
+    file : NC text, CL data, a CAMotics project, DXF, STEP, STL, FreeCAD document or blade sections
     folder : of the job, to which file names are relative
     machine : a shipped name or a file (TOML); None: guessed
     tools : a LinuxCNC tool table of a program, or a tool library of Fusion, whose tools are assigned by number
@@ -50,10 +50,9 @@ def draft_of(
         make = draft_drawing if ending == ".dxf" else draft_model
         return make(file, folder, machine)
     if ending in MESHES:
-        raise InputError(
-            f"{file}: a mesh has no faces or contours to plan from: export STEP or DXF, or post the program of your "
-            "CAM and name the mesh in its job: [part] or [stock] file"
-        )
+        from chipload.jobs.drafts.mesh import draft_mesh
+
+        return draft_mesh(file, folder, machine)
     from chipload.jobs.drafts.blade import draft_sections, holds_sections
     from chipload.jobs.drafts.program import Known, draft_program
 
