@@ -35,6 +35,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     hostile["provenance"]["inputs"]["program"] = "<svg onload='window.hacked=1'> sha256 00"
     path.write_text(json.dumps(hostile))
     (root / "bare" / "report.html").write_text("<script>fetch('/')</script>")
+    (root / "older").mkdir()
+    (root / "older" / "summary.json").write_text('{"schema_version": 0, "verdict": "holds"}')
     shutil.copytree(EXAMPLES / "contour", root / "contour")
     job = root / "contour" / "job.toml"
     text = job.read_text().replace('["plain", "backward", "feed"]', '["backward"]')

@@ -49,6 +49,21 @@ def test_results_are_grouped_by_their_job_the_newest_first(tmp_path) -> None:
     assert newest.changed_ns == 1_700_000_180 * 10**9
 
 
+def test_a_result_of_another_schema_is_listed_with_its_reason(tmp_path) -> None:
+    make_result(tmp_path / "now")
+    shutil.copytree(tmp_path / "now", tmp_path / "old")
+    summary = tmp_path / "old" / "summary.json"
+    summary.write_text(summary.read_text().replace('"schema_version":1', '"schema_version":0').replace(
+        '"schema_version": 1', '"schema_version": 0'))  # fmt: skip
+    for name, text in (("other", '{"name": "of another program"}'), ("list", "[]"), ("damaged", "{")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "summary.json").write_text(text)
+    entries, _ = list_folder(tmp_path)
+    assert [(e.name, e.kind) for e in entries] == [("now", "result"), ("old", "unread")]
+    assert entries[1].word == "is not a result of schema version 1 (1 difference): run the job again"
+    assert [g.title for g in home_groups(tmp_path, entries)] == ["square"]
+
+
 def test_the_picture_of_a_box_covers_its_projection() -> None:
     low, high = np.array([3.0, -2.0, 1.0]), np.array([63.0, 38.0, 11.0])
     image = picture([box_body(low, high)], np.zeros((0, 3)), np.zeros((0, 3)))

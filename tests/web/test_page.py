@@ -50,14 +50,20 @@ def test_what_the_folder_holds_is_shown_by_job_with_pictures_and_opened(window) 
     assert card.locator(".cl-pill").inner_text() == "exceeds"
     assert card.locator(".answer .value").inner_text() == "force 900 of 800 N"
     assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d$", card.locator(".cl-result-head .cl-note").inner_text())
+    older = page.locator(".cl-entry", has=page.get_by_text("older", exact=True)).inner_text()
+    assert "is not a result of schema version 1" in older
     page.wait_for_function("[...document.querySelectorAll('.cl-result img')].every(i => i.naturalWidth == 312)")
     for width, least in ((420, 1), (1280, 4), (1920, 4)):
         page.set_viewport_size({"width": width, "height": 800})
         page.wait_for_function("w => document.documentElement.scrollWidth == w", arg=width)
         lefts = {round(box["x"]) for one in page.locator(".cl-result").all() if (box := one.bounding_box())}
         assert len(lefts) == 1 if least == 1 else len(lefts) >= least
+        assert serious_problems(page) == [], width
+        # no heading of a group is cut off
+        assert page.evaluate(
+            "[...document.querySelectorAll('.cl-group .cl-what')].every(e => e.scrollWidth <= e.clientWidth + 1)"
+        )
     page.set_viewport_size({"width": 1280, "height": 720})
-    assert serious_problems(page) == []
     card.click()
     page.wait_for_selector(".cl-limits", state="visible")
     assert page.inner_text(".cl-word") == "exceeds"

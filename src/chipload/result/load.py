@@ -41,9 +41,10 @@ def read_summary(folder: str | Path) -> Summary:
     except OSError as err:
         raise InputError(f"{path}: cannot be read: {err.strerror}: name a result folder") from None
     except ValidationError as err:
+        count = err.error_count()
+        differences = f"{count} difference{'s' if count > 1 else ''}"
         raise InputError(
-            f"{path}: is not a result of schema version {SCHEMA_VERSION} ({err.error_count()} differences): run the "
-            "job again"
+            f"{path}: is not a result of schema version {SCHEMA_VERSION} ({differences}): run the job again"
         ) from None
 
 

@@ -7,6 +7,7 @@ before anything is opened; what then lies outside the folder is refused.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.jobs import CAPABILITIES
 from chipload.result import Verdict, read_summary
-from chipload.result.load import SUMMARY
+from chipload.result.load import LARGEST_SUMMARY, SUMMARY
 from chipload.tables import parse_toml
 
 #: folders within folders, and entries, that are searched
@@ -36,7 +37,9 @@ class OpenedFolder:
 
 @dataclass(frozen=True)
 class FolderEntry:
-    """A result or a job in the opened folder; ``word`` is the verdict of a result."""
+    """A result or a job in the opened folder, or (``unread``) a result that this version does not read; ``word`` is the
+    verdict of a result, or why it is not read.
+    """
 
     name: str
     kind: str
@@ -121,12 +124,26 @@ def list_folder(root: Path) -> tuple[list[FolderEntry], bool]:
         except InputError:
             continue
         if real.name == SUMMARY and path.name == SUMMARY:
-            verdict = verdict_of(path.parent)
-            if verdict is not None:
-                out.append(FolderEntry(path.parent.relative_to(root).as_posix(), "result", verdict.value))
+            entry = _result_entry(root, path.parent)
+            out += [] if entry is None else [entry]
         elif is_job(real):
             out.append(FolderEntry(name, "job", ""))
     return sorted(out, key=lambda f: (f.kind, f.name)), len(files) <= ENTRIES
+
+
+def _result_entry(root: Path, folder: Path) -> FolderEntry | None:
+    """The entry of a folder with a summary; None: the summary is not of chipload."""
+    name = folder.relative_to(root).as_posix()
+    try:
+        return FolderEntry(name, "result", read_summary(folder).verdict.value)
+    except InputError as err:
+        why = str(err).replace(f"{folder / SUMMARY}: ", "")
+    try:
+        holds = json.loads(read_regular(folder / SUMMARY, SUMMARY, LARGEST_SUMMARY))
+    except (InputError, ValueError, RecursionError):
+        return None
+    ours = isinstance(holds, dict) and ("schema_version" in holds or "holds" in holds)
+    return FolderEntry(name, "unread", why) if ours else None
 
 
 def find_by_hash(root: Path, wanted: str) -> Path | None:

@@ -33,7 +33,7 @@ from chipload.web.folder_access import (
 from chipload.web.home import home_groups
 from chipload.web.panels import RELEASE
 from chipload.web.panels.dropped import DropZone, Questions
-from chipload.web.panels.home import HomePanel
+from chipload.web.panels.home import HomePanel, list_unread
 from chipload.web.panels.job_form import JobForm
 from chipload.web.panels.shape import ShapePanel
 from chipload.web.result import NoMotionError, PageResult, open_result
@@ -270,10 +270,12 @@ class Page:
             ui.label("Results and jobs in this folder").classes("cl-dialog-title").props("role=heading aria-level=2")
             _list_notes(found, all_seen)
             HomePanel(groups, self._folder_name, self.show, self._job, self._request_folder)
+            list_unread(found, self._folder_name)
 
     def _list_results(self, found: list[FolderEntry], all_seen: bool) -> None:
         _list_notes(found, all_seen)
-        for f in found:
+        list_unread(found, self._folder_name)
+        for f in (f for f in found if f.kind != "unread"):
             with ui.element("div").classes("cl-entry"):
                 ui.icon("analytics" if f.kind == "result" else "description").classes("cl-icon")
                 ui.label(self._folder_name(f.name)).classes("cl-what")

@@ -9,6 +9,7 @@ from urllib.parse import quote
 from nicegui import ui
 
 from chipload.report.answer import answer_html
+from chipload.web.folder_access import FolderEntry
 from chipload.web.home import HomeGroup, HomeResult
 from chipload.web.result_view import VERDICTS
 
@@ -76,6 +77,21 @@ class HomePanel:
                 ui.label(result.message).classes("cl-note cl-result-text")
         card.mark(f"show-{result.name}")
         card.on("click", lambda: self.show(result.name), js_handler=PLAIN_CLICK)
+
+
+def list_unread(entries: Sequence[FolderEntry], label: Callable[[str], str]) -> None:
+    """List results that this version does not read, each with the reason; nothing where there is none."""
+    unread = [entry for entry in entries if entry.kind == "unread"]
+    if not unread:
+        return
+    ui.label("Results that are not read").classes("cl-dialog-title").props("role=heading aria-level=2")
+    for entry in unread[:GROUPS]:
+        with ui.element("div").classes("cl-entry").mark(f"unread-{entry.name}"):
+            ui.icon("history").classes("cl-icon")
+            ui.label(label(entry.name)).classes("cl-what")
+            ui.label(entry.word).classes("cl-note cl-why")
+    if len(unread) > GROUPS:
+        ui.label(f"{len(unread) - GROUPS} more are not read.").classes("cl-note")
 
 
 def _button(text: str, act: Any, icon: str | None = None) -> Any:
