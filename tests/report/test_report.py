@@ -28,7 +28,7 @@ from chipload.report.folder import write_result
 from chipload.report.page import limits_table, page_bytes
 from chipload.report.presentation import Presentation
 from chipload.report.shape import slab, stretches
-from chipload.result import Verdict
+from chipload.result import Coverage, Verdict
 from chipload.result.history import write_history
 from chipload.result.load import load_result
 from chipload.result.summary import summary_bytes
@@ -288,7 +288,7 @@ def test_limits_of_many_tracks_are_folded(outcome: Maker) -> None:
     others = [replace(t, name=f"{t.name} {k}", in_use=False) for k in range(2) for t in tracks if not t.in_use]
     broken = replace(used, name="broken", in_use=False)
     table = "".join(limits_table([used, *others, broken]))
-    rows = [re.sub("<[^>]*>", "|", row) for row in re.findall(r"<tr.*?</tr>", table)[1:]]
+    rows = [re.sub("<[^>]*>", "|", row) for row in re.findall(r"<tr(?! class=.more).*?</tr>", table)[1:]]
     assert len(rows) == 2 + 2 * (1 + 2) + 2
     assert sum("all limits (2)" in row for row in rows) == 2
     assert [("exceeds" in row, "the other limits (1)" in row) for row in rows if "broken" in row] == [
@@ -300,7 +300,7 @@ def test_the_table_of_limits_has_the_numbers_of_the_result(outcome: Maker) -> No
     made = outcome("plain")
     html = report(made).decode()
     table = html[html.index("<h2>Limits</h2>") :]
-    rows = re.findall(r"<tr.*?</tr>", table[: table.index("</table>")])[1:]
+    rows = re.findall(r"<tr(?! class=.more).*?</tr>", table[: table.index("</table>")])[1:]
     cells = [[re.sub("<[^>]*>", "", c) for c in re.findall(r"<td[^>]*>(.*?)</td>", row)] for row in rows]
     wanted = {(t.name, c.column.title, c.state.value, f"{c.limit:g}", f"{c.worst:.4g}")
               for t in result_of(made).tracks for c in t.limits}  # fmt: skip
@@ -309,6 +309,18 @@ def test_the_table_of_limits_has_the_numbers_of_the_result(outcome: Maker) -> No
     # the track in use first, its worst state first
     assert [c[0] for c in cells[:2]] == ["plain in use"] * 2
     assert [c[2] for c in cells[:2]] == ["exceeds", "holds"]
+
+
+def test_reason_and_coverage_of_a_limit_stand_below_its_row_in_full_width(outcome: Maker) -> None:
+    used = next(t for t in result_of(outcome("plain")).tracks if t.in_use)
+    why = "the value is known to 2.14 %, and the limit lies within this"
+    coverage = Coverage("finish pass", "limits count where the wall is made", ((0, 1),), 1.0, 1.0)
+    limit = replace(used.limits[0], state=Verdict.UNPROVEN, reason=why, coverage=coverage)
+    note, table = limits_table([replace(used, limits=(limit, used.limits[1]))])
+    assert "covers every step of its track, where the line below it names no others" in note
+    columns = len(re.findall("<th[ >]", table))
+    below = re.findall(r'<tr class="more[^"]*"><td></td><td colspan="(\d+)">(.*?)</td></tr>', table)
+    assert (int(below[0][0]), below[0][1]) == (columns - 1, f"{why} \u00b7 covers: finish pass")
 
 
 def test_a_pass_that_never_cut_is_still_shown(outcome: Maker) -> None:

@@ -122,7 +122,7 @@ def report_of(folder: Path) -> str:
 
 def rows_of(text: str) -> list[list[str]]:
     """Cells of the first table of a page."""
-    rows = re.findall(r"<tr.*?</tr>", text[: text.index("</table>")], flags=re.S)[1:]
+    rows = re.findall(r"<tr(?! class=.more).*?</tr>", text[: text.index("</table>")], flags=re.S)[1:]
     return [[html.unescape(re.sub("<[^>]*>", "", c)) for c in re.findall(r"<td[^>]*>(.*?)</td>", r)] for r in rows]
 
 

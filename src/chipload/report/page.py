@@ -82,7 +82,8 @@ def limits_table(tracks: Iterable[Track]) -> list[str]:
     """Every limit, those of tracks in use first, within a track the worst state first.
 
     Of more than :data:`WHOLE` tracks those not in use show the limits that do not hold, the rest in one row.
-    Behind the worst value a column is left out where all its cells are empty.
+    Behind the worst value a column is left out where all its cells are empty. Reason, coverage and the parts of the
+    value at a confidence stand below the row, in the width of the table.
     """
     all_tracks = list(tracks)
     whole = len(all_tracks) <= WHOLE
@@ -97,12 +98,20 @@ def limits_table(tracks: Iterable[Track]) -> list[str]:
     if not checks:
         return ["<p>No limit was checked.</p>"]
     rows = [_limit_row(track, check) for track, check in checks[:LISTED]]
-    head = ["track", "limit", "state", "limit value", "worst", "resolution", _level(checks), "parts", "line"]
-    head += ["time [s]", "place [mm]", "reason", "covers"]
+    head = ["track", "limit", "state", "limit value", "worst", "resolution", _level(checks), "line"]
+    head += ["time [s]", "place [mm]"]
     kept = [k for k in range(len(head)) if k < 5 or any(row[k] for row in rows)]
-    numbers = tuple(i for i, k in enumerate(kept) if k in (3, 4, 5, 6, 8, 9))
+    numbers = tuple(i for i, k in enumerate(kept) if k in (3, 4, 5, 6, 7, 8))
     cells = [[row[k] for k in kept] for row in rows]
-    return [table([head[k] for k in kept], cells, numbers, [t.in_use for t, _ in checks[:LISTED]])]
+    notes = [_limit_note(check) for _, check in checks[:LISTED]]
+    partly = any(check is not None and not check.coverage.whole for _, check in checks)
+    covers = "A limit covers every step of its track" + (
+        ", where the line below it names no others." if partly else "."
+    )
+    return [
+        f'<p class="note">{covers}</p>',
+        table([head[k] for k in kept], cells, numbers, [t.in_use for t, _ in checks[:LISTED]], notes),
+    ]
 
 
 def _level(checks: Iterable[tuple[Track, LimitCheck | None]]) -> str:
@@ -118,7 +127,7 @@ def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:
         passing = [x.column.label for x in track.limits if x.state is Verdict.HOLDS]
         others = "all limits" if len(passing) == len(track.limits) else "the other limits"
         text = f'<span title="{escape(", ".join(passing))}">{others} ({len(passing)})</span>'
-        return [name, text, state_cell(Verdict.HOLDS), *[""] * 10]
+        return [name, text, state_cell(Verdict.HOLDS), *[""] * 7]
     return [
         name,
         f'<span class="name">{escape(check.column.title)}</span>',
@@ -127,13 +136,24 @@ def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:
         "not known" if check.worst is None else number_text(check.worst),
         percent_text(check.error) if check.error else "",
         "" if check.value_at_confidence is None else number_text(check.value_at_confidence, 3),
-        escape("" if check.budget is None or check.worst is None else check.budget.parts_text(check.worst)),
         str(check.line or ""),
         "" if check.t_s is None else f"{check.t_s:.4g}",
         place_cell(check),
-        escape(check.reason),
-        "" if check.coverage.whole else escape(check.coverage.name),
     ]
+
+
+def _limit_note(check: LimitCheck | None) -> str:
+    """What stands below the row of a limit: why its state is so, what it covers, the parts of its error."""
+    if check is None:
+        return ""
+    parts = "" if check.budget is None or check.worst is None else check.budget.parts_text(check.worst)
+    level = "" if check.budget is None else level_text(check.budget.shown_at)
+    texts = (
+        check.reason,
+        "" if check.coverage.whole else f"covers: {check.coverage.name}",
+        f"at {level}: {parts}" if parts else "",
+    )
+    return " \u00b7 ".join(escape(text) for text in texts if text)
 
 
 def tracks_table(tracks: tuple[Track, ...]) -> list[str]:

@@ -47,6 +47,8 @@ thead th { font-weight: 600; color: var(--soft); font-size: 12.5px; border-botto
 td.n, th.n { text-align: right; white-space: nowrap; }
 td:first-child, td .name { white-space: nowrap; }
 tr.used td { background: #f1f7f6; }
+tr.noted td { border-bottom: 0; padding-bottom: 0; }
+tr.more td { color: var(--soft); font-size: 12.5px; padding-top: 1px; white-space: normal; }
 .ok { color: var(--good); } .no { color: var(--bad); font-weight: 600; }
 .may { color: var(--may); font-weight: 600; }
 .dot { display: inline-block; width: 10px; height: 10px; border-radius: 5px; margin-right: 7px; }
@@ -176,16 +178,29 @@ def fold_sections(body: Sequence[str], opened: Collection[str] = ()) -> list[str
 
 
 def table(
-    head: Iterable[str], rows: Iterable[Iterable[str]], numbers: tuple[int, ...] = (), used: Iterable[bool] = ()
+    head: Iterable[str],
+    rows: Iterable[Iterable[str]],
+    numbers: tuple[int, ...] = (),
+    used: Iterable[bool] = (),
+    notes: Iterable[str] = (),
 ) -> str:
-    """A table of HTML cells; columns ``numbers`` stand at the right, rows ``used`` are tinted."""
+    """A table of HTML cells; columns ``numbers`` stand at the right, rows ``used`` are tinted, ``notes`` stand below
+    their rows in the width of the table, none where they are empty.
+    """
 
     def cells(tag: str, row: Iterable[str]) -> str:
         return "".join(f"<{tag}{' class=n' if i in numbers else ''}>{x}</{tag}>" for i, x in enumerate(row))
 
-    rows = list(rows)
-    marks = list(used) or [False] * len(rows)
-    lines = [f"<tr{' class=used' if m else ''}>{cells('td', r)}</tr>" for r, m in zip(rows, marks, strict=True)]
+    head, rows = list(head), list(rows)
+    marks, below = list(used) or [False] * len(rows), list(notes) or [""] * len(rows)
+    lines = list[str]()
+    for row, mark, note in zip(rows, marks, below, strict=True):
+        names = " ".join(name for name, on in (("used", mark), ("noted", bool(note))) if on)
+        kind = f' class="{names}"' if names else ""
+        lines.append(f"<tr{kind}>{cells('td', row)}</tr>")
+        if note:
+            tint = "more used" if mark else "more"
+            lines.append(f'<tr class="{tint}"><td></td><td colspan="{len(head) - 1}">{note}</td></tr>')
     return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
 
 
