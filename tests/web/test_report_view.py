@@ -37,7 +37,7 @@ def page(browser, written):
     page.on("pageerror", lambda e: wrong.append(str(e)))
     page.goto(written.as_uri())
     page.wait_for_selector(".view3d canvas")
-    page.wait_for_function("document.querySelector('.cv-print')?.src.length > 1000")
+    page.wait_for_function("document.querySelector('.cv-print img')?.src.length > 1000")
     yield page
     page.close()
     assert wrong == []
@@ -70,6 +70,15 @@ def test_it_prints_a_picture_and_does_not_scroll_sideways(page, pixels) -> None:
     page.emulate_media(media="print")
     assert page.locator(".cv-print").is_visible()
     assert not page.locator(".cv-box").is_visible()
+    # the scale of colours, the message and a length stand below the picture
+    assert page.locator(".cv-print .cv-ramp").is_visible()
+    assert page.inner_text(".cv-print .cv-note") == page.text_content(".cv-box .cv-note")
+    wide, share = page.evaluate(
+        """() => { const line = document.querySelector('.cv-print .cv-scale div');
+        return [line.getBoundingClientRect().width / document.querySelector('.cv-print img').clientWidth,
+                Number(document.querySelector('.cv-box .cv-scale div').dataset.share)]; }"""
+    )
+    assert wide == pytest.approx(share, rel=0.01)
     picture = pixels(page.locator(".cv-print").screenshot())
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
     assert len(page.pdf()) > 20_000

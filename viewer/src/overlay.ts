@@ -36,7 +36,10 @@ const STYLE = `
 .cv-chip canvas { position: absolute; inset: 0; width: 100%; height: 100%; display: block; }
 .cv-cut-plots { display: contents; }
 .cv-plot { width: 100%; max-height: 240px; background: #fff; border: 1px solid #edf0f3; }
-.cv-print { display: none; width: 100%; }
+.cv-print { display: none; position: relative; }
+.cv-print * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
+.cv-print img { width: 100%; } .cv-print .cv-bar, .cv-print .cv-note { position: static; max-width: none; }
+.cv-print .cv-scale { position: static; display: block; padding: 2px 0; text-align: left; }
 @media print { .cv-box, .cv-controls { display: none; } .cv-print { display: block; } }
 @media (max-width: 600px) { .cv-scale { display: none; } .cv-note { max-width: calc(100% - 110px); } }
 `;
@@ -148,6 +151,15 @@ export class Overlay {
     this.add(worse ? "cv-red" : "", text, head);
   }
 
+  /** Message, length and scales as a print shows them below the picture, which is as wide as the page. */
+  printed(): HTMLElement[] {
+    const [note, scale, bar] = [this.note, this.scale, this.bar].map((e) => e.cloneNode(true) as HTMLElement);
+    const line = scale.querySelector("div");
+    if (line) line.style.width = `${100 * Number(line.dataset.share ?? 0)}%`;
+    note.removeAttribute("role");
+    return [note, scale, bar];
+  }
+
   /** A bar of a round length: mm per pixel is that at the middle of what is looked at. */
   ruler(perPixel: number): void {
     const most = 110 * perPixel, power = 10 ** Math.floor(Math.log10(most));
@@ -155,6 +167,8 @@ export class Overlay {
     this.scale.textContent = `${number(length)} mm`;
     const line = document.createElement("div");
     line.style.width = `${length / perPixel}px`;
+    // a print has the picture in another width
+    if (this.stage.clientWidth) line.dataset.share = String(length / perPixel / this.stage.clientWidth);
     this.scale.append(line);
   }
 

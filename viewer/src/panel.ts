@@ -50,12 +50,15 @@ export async function panel(host: HTMLElement, texts: [string, string][]): Promi
     show(doc);
   };
   show(first);
-  // what a printer gets
-  const image = made("img");
+  // what a printer gets: the picture with its message, length and scales of colours
+  const print = made("div"), image = made("img");
+  print.className = "cv-print";
   image.alt = "the 3D view";
-  image.className = "cv-print";
-  const photograph = () => { image.src = view.picture(); };
-  host.append(image);
+  const photograph = () => {
+    image.src = view.picture();
+    print.replaceChildren(image, ...view.overlay.printed());
+  };
+  host.append(print);
   requestAnimationFrame(photograph);
   addEventListener("beforeprint", photograph);
   return view;

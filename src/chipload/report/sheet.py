@@ -57,8 +57,11 @@ dl { display: grid; grid-template-columns: max-content 1fr; gap: 2px 18px; margi
 dt { color: var(--soft); } dd { margin: 0; overflow-wrap: anywhere; }
 code { font: 12.5px ui-monospace, "DejaVu Sans Mono", monospace; }
 .figure { width: 100%; margin: 4px 0 6px; }
-@media print { body { background: white; } main { max-width: none; padding: 0; } .figure, table { break-inside: avoid; }
-  h2, h3 { break-after: avoid; } }
+@page { margin: 12mm; }
+@media print { body { background: white; } main { max-width: none; padding: 0; } .figure, tr { break-inside: avoid; }
+  tr.noted { break-after: avoid; } h2, h3, summary { break-after: avoid; }
+  td:first-child, td .name { white-space: normal; } table { font-size: 11px; } th, td { padding: 4px 6px; }
+  * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
 @media (max-width: 760px) { main { padding: 12px 10px 32px; } table { display: block; overflow-x: auto; }
   .figure { max-width: 100%; overflow: hidden; } dl { display: block; } dd { margin: 0 0 6px 12px; } }
 """
@@ -78,6 +81,7 @@ async function library(id) {
 _DRAW = """
 const figures = JSON.parse(document.getElementById("figures").textContent);
 const config = {displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"]};
+const names = Object.keys(figures);
 function draw(id) {
   const figure = figures[id];
   if (!figure) return;
@@ -90,7 +94,10 @@ Object.keys(figures).forEach(id => seen.observe(document.getElementById(id)));
 addEventListener("beforeprint", () => {
   document.querySelectorAll("details").forEach(e => { e.open = true; });
   Object.keys(figures).forEach(draw);
+  // as wide as a sheet of A4 between its margins
+  names.forEach(id => Plotly.relayout(id, {width: 700}));
 });
+addEventListener("afterprint", () => names.forEach(id => Plotly.relayout(id, {width: null, autosize: true})));
 """
 
 
