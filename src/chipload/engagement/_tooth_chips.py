@@ -34,21 +34,25 @@ NONE, SMALL = 1e-9, 1e-4
 GRID, THICK = 1e-9, 1e-2
 
 
-@njit(cache=True, nogil=True)
-def chip(phi, f, c, R):
-    """Chip [mm] against a tooth that passed f [mm] of feed before, of second order in f / R; c feed per radian."""
-    co = math.cos(phi)
-    return f * math.sin(phi) * (1.0 - c * co / R) + f * f * co * co / (2.0 * R)
+@njit(cache=True, nogil=True, inline="always")
+def chip(si, co, f, c, R):
+    """Chip [mm] against a tooth that passed f [mm] of feed before, of second order in f / R, at the immersion with the
+    sine ``si`` and the cosine ``co``; c feed per radian.
+    """
+    return f * si * (1.0 - c * co / R) + f * f * co * co / (2.0 * R)
 
 
-@njit(cache=True, nogil=True)
-def sinusoid_through(p, q, hp, hm, hq):
-    """(along, offset, across) of the sinusoid through hp, hm, hq at p, (p + q) / 2, q."""
-    w = 0.5 * (q - p)
-    m = 0.5 * (p + q)
-    A = (hm - 0.5 * (hp + hq)) / (1.0 - math.cos(w)) if w > SMALL else 0.0
-    B = (hq - hp) / (2.0 * math.sin(w))
-    return A * math.sin(m) + B * math.cos(m), hm - A, A * math.cos(m) - B * math.sin(m)
+@njit(cache=True, nogil=True, inline="always")
+def sinusoid_of_chip(sm, cm, sw, cw, f, c, R):
+    """(along, offset, across) of the sinusoid through the chip at the middle m of a piece and at its ends m - w and
+    m + w, from the sines and cosines of m and w.
+    """
+    hp = chip(sm * cw - cm * sw, cm * cw + sm * sw, f, c, R)
+    hm = chip(sm, cm, f, c, R)
+    hq = chip(sm * cw + cm * sw, cm * cw - sm * sw, f, c, R)
+    A = (hm - 0.5 * (hp + hq)) / (1.0 - cw) if sw > SMALL else 0.0
+    B = (hq - hp) / (2.0 * sw)
+    return A * sm + B * cm, hm - A, A * cm - B * sm
 
 
 @njit(cache=True, nogil=True)
@@ -95,10 +99,11 @@ def round_ranges(rows, slices):
     if size <= 0.0:
         return rows.copy()
     out = np.empty_like(rows)
+    grid = np.array([GRID, GRID, GRID * size, GRID * size, *[GRID * THICK * size] * 3])
+    over = 1.0 / grid
     for r in range(len(rows)):
         for d in range(7):
-            grid = GRID if d < 2 else GRID * size if d < 4 else GRID * THICK * size
-            out[r, d] = math.floor(rows[r, d] / grid + 0.5) * grid
+            out[r, d] = math.floor(rows[r, d] * over[d] + 0.5) * grid[d]
     return out
 
 
@@ -125,11 +130,12 @@ def parts_of_lag(span, wide, thick, swing, e, share):
 
 
 @njit(cache=True, nogil=True)
-def put(out, own, parent, before, at, p, q, s0, s1, al, of, ac, turned, tooth, row, m):
-    """Write one range, its immersion counted from the feed less ``turned`` [rad], if there is room; next number."""
+def put(out, own, parent, before, at, p, q, s0, s1, al, of, ac, turned, si, co, tooth, row, m):
+    """Write one range, its immersion counted from the feed less ``turned`` [rad], if there is room; next number.
+
+    ``si``, ``co``: sine and cosine of ``turned``.
+    """
     if at < len(out):
-        co = math.cos(turned)
-        si = math.sin(turned)
         low = p - turned
         low -= TAU * math.floor(low / TAU)
         out[at, 0] = low
@@ -146,11 +152,13 @@ def put(out, own, parent, before, at, p, q, s0, s1, al, of, ac, turned, tooth, r
 
 
 @njit(cache=True, nogil=True, inline="always")
-def along_wall(line, lines, phi, sine, rho, radius):
-    """Add the line of the chip that runs out along the wall that a circle of radius ``rho`` meets at phi."""
+def along_wall(line, lines, cosine, sine, rho, radius):
+    """Add the line of the chip that runs out along the wall that a circle of radius ``rho`` meets where the immersion
+    has that cosine.
+    """
     line[lines, 0] = 0.0
     line[lines, 1] = sine * (radius - rho)
-    line[lines, 2] = sine * rho / math.cos(phi)
+    line[lines, 2] = sine * rho / cosine
     line[lines, 3] = 0.0
     return lines + 1
 
@@ -203,28 +211,35 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
                     fed = 1.0 if one else turns[j, 0]
                     at = put(
                         out, own, parent, before, at, rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3],
-                        fed * rows[r, 4], fed * offset, fed * rows[r, 6], 0.0, tooth[r] if one else j, r, np.int64(1),
+                        fed * rows[r, 4], fed * offset, fed * rows[r, 6], 0.0, 0.0, 1.0, tooth[r] if one else j, r,
+                        np.int64(1),
                     )  # fmt: skip
                 continue
             f = swing / sine
             rho = max(slices[k, 1], f / LARGE)
             c = N * f / TAU
             turned = math.atan2(rows[r, 6], rows[r, 4])
+            st = rows[r, 6] / swing
+            ct = rows[r, 4] / swing
             p = rows[r, 0] + turned
             p -= TAU * math.floor((p + 1e-6) / TAU)
             q = p + rows[r, 1] - rows[r, 0]
+            sp = math.sin(p)
+            cp = math.cos(p)
+            sq = math.sin(q)
+            cq = math.cos(q)
             whole = rows[r, 1] - rows[r, 0] > TAU - 1e-6
             least = CUSP * (swing + abs(offset))
-            cusp_p = abs(swing * math.sin(p) + offset) <= least
-            cusp_q = abs(swing * math.sin(q) + offset) <= least
+            cusp_p = abs(swing * sp + offset) <= least
+            cusp_q = abs(swing * sq + offset) <= least
             # a wall shortens the chip where the tooth before has cut along it already
-            area = math.cos(p) - math.cos(q)
+            area = cp - cq
             level = abs(offset) <= LEVEL * swing and not whole
-            wall_p = level and not cusp_p and p < PI and math.cos(p) < -STEEP
-            wall_q = level and not cusp_q and q < PI and math.cos(q) > STEEP
-            if wall_p and 0.5 * f / rho * abs(math.sin(p) * math.cos(p)) < THIN * area:
+            wall_p = level and not cusp_p and p < PI and cp < -STEEP
+            wall_q = level and not cusp_q and q < PI and cq > STEEP
+            if wall_p and 0.5 * f / rho * abs(sp * cp) < THIN * area:
                 wall_p = False
-            if wall_q and 0.5 * f / rho * abs(math.sin(q) * math.cos(q)) < THIN * area:
+            if wall_q and 0.5 * f / rho * abs(sq * cq) < THIN * area:
                 wall_q = False
             if r > start[i]:
                 if wall_p and adjoin(rows, piece, r - 1, r):
@@ -250,14 +265,15 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
             for part in range(parts):
                 x = first + (last - first) * part / parts
                 y = first + (last - first) * (part + 1) / parts
-                mid = 0.5 * (x + y)
                 if y - x > NONE:
+                    sm = math.sin(0.5 * (x + y))
+                    cm = math.cos(0.5 * (x + y))
+                    sw = math.sin(0.5 * (y - x))
+                    cw = math.cos(0.5 * (y - x))
                     for j in range(1 if alike else N):
                         for m in range(most):
                             past = f * turns[j, m]
-                            al, of, ac = sinusoid_through(
-                                x, y, chip(x, past, c, rho), chip(mid, past, c, rho), chip(y, past, c, rho)
-                            )
+                            al, of, ac = sinusoid_of_chip(sm, cm, sw, cw, past, c, rho)
                             cut[part, j, m, 0] = sine * al
                             cut[part, j, m, 1] = sine * of + offset * turns[j, m]
                             cut[part, j, m, 2] = sine * ac
@@ -272,9 +288,9 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
                     lo = first
                     hi = last
                     if not alike and level and not cusp_p and p < PI:
-                        lo = math.acos(min(max(rho * math.cos(p) / (rho + radii[j]), -1.0), 1.0))
+                        lo = math.acos(min(max(rho * cp / (rho + radii[j]), -1.0), 1.0))
                     if not alike and level and not cusp_q and q < PI:
-                        hi = math.acos(min(max(rho * math.cos(q) / (rho + radii[j]), -1.0), 1.0))
+                        hi = math.acos(min(max(rho * cq / (rho + radii[j]), -1.0), 1.0))
                     for part in range(parts):
                         x = lo if part == 0 else first + (last - first) * part / parts
                         y = hi if part == parts - 1 else first + (last - first) * (part + 1) / parts
@@ -289,18 +305,33 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
                             line[m, 3] = m + 1
                         lines = most
                         if wall_p and part == 0:
-                            lines = along_wall(line, lines, p, sine, rho, radii[j])
+                            lines = along_wall(line, lines, cp, sine, rho, radii[j])
                         if wall_q and part == parts - 1:
-                            lines = along_wall(line, lines, q, sine, rho, radii[j])
+                            lines = along_wall(line, lines, cq, sine, rho, radii[j])
                         at = lowest(
-                            line, lines, x, y, s0, s1, turned, -1 if alike else j, r, out, own, parent, before, at
+                            line,
+                            lines,
+                            x,
+                            y,
+                            s0,
+                            s1,
+                            turned,
+                            st,
+                            ct,
+                            -1 if alike else j,
+                            r,
+                            out,
+                            own,
+                            parent,
+                            before,
+                            at,
                         )
         room[i + 1] = at
     return at
 
 
 @njit(cache=True, nogil=True)
-def lowest(line, lines, x, y, s0, s1, turned, tooth, row, out, own, parent, before, at):
+def lowest(line, lines, x, y, s0, s1, turned, st, ct, tooth, row, out, own, parent, before, at):
     """Write the ranges in x .. y [rad] of the lower envelope of lines where it is positive; next number.
 
     From each corner on the lowest line stays so until another crosses it downwards. A line is not looked at whose
@@ -318,14 +349,14 @@ def lowest(line, lines, x, y, s0, s1, turned, tooth, row, out, own, parent, befo
             low = v
             best = m
     g = x
+    sg = sx
+    cg = cx
     steps = 0
     while g < y - NONE and steps < 4 * lines + 4:
         steps += 1
         end = y
         after = best
         if lines > 1:
-            sg = math.sin(g)
-            cg = math.cos(g)
             bend = 0.125 * (y - g) * (y - g)
             for m in range(lines):
                 if m == best:
@@ -343,17 +374,27 @@ def lowest(line, lines, x, y, s0, s1, turned, tooth, row, out, own, parent, befo
         al = line[best, 0]
         of = line[best, 1]
         ac = line[best, 2]
-        u = g
-        for _ in range(3):
-            t = first_root(al, of, ac, u, end)
-            if t > u + NONE:
-                mid = 0.5 * (u + t)
-                if al * math.sin(mid) + of + ac * math.cos(mid) > 0.0:
-                    m = int(line[best, 3])
-                    at = put(out, own, parent, before, at, u, t, s0, s1, al, of, ac, turned, tooth, row, m)
-            u = t
-            if t >= end:
-                break
+        se = sy if end == y else math.sin(end)
+        ce = cy if end == y else math.cos(end)
+        vg = al * sg + of + ac * cg
+        ve = al * se + of + ac * ce
+        m = int(line[best, 3])
+        if vg >= 0.0 and ve >= 0.0 and (al * cg >= ac * sg or al * ce <= ac * se):
+            # positive at both ends, with no trough between them
+            at = put(out, own, parent, before, at, g, end, s0, s1, al, of, ac, turned, st, ct, tooth, row, m)
+        elif vg >= 0.0 or ve >= 0.0 or (al * cg > ac * sg and al * ce < ac * se):
+            u = g
+            for _ in range(3):
+                t = first_root(al, of, ac, u, end)
+                if t > u + NONE:
+                    mid = 0.5 * (u + t)
+                    if al * math.sin(mid) + of + ac * math.cos(mid) > 0.0:
+                        at = put(out, own, parent, before, at, u, t, s0, s1, al, of, ac, turned, st, ct, tooth, row, m)
+                u = t
+                if t >= end or (t > g and vg >= 0.0 and ve < 0.0):
+                    break
+        sg = se
+        cg = ce
         g = end
         best = after
     return at

@@ -115,14 +115,14 @@ def chips_and_paths(front: ToothEngagement, cutter: Cutter) -> tuple[ToothEngage
         if count <= guess:
             break
         guess = count
-    rows, tooth, parent = out[:count].copy(), tooth[:count].copy(), parent[:count].copy()
+    # without a copy: what is beyond was never in memory
+    rows, tooth, parent, before = out[:count], tooth[:count], parent[:count], before[:count]
     own, slices = front.slice[parent], front.slices
     if cutter.pitch:
         late = cutter.tooth_angles - math.tau / N * np.arange(N)
         own, many = own + np.maximum(tooth, 0) * len(slices), len(slices)
         slices = np.tile(slices, (N, 1))
         slices[:, 5] += np.repeat(late - late.min(), many)
-    before = before[:count].copy()
     if slices.shape[1] > 7:
         # what runs out along a wall runs with it
         walls = np.flatnonzero((before == 0) & (slices[own, 11] > 0.0))
