@@ -16,8 +16,6 @@ from numba import njit
 
 PI = math.pi
 TAU = 2.0 * math.pi
-#: widest piece of immersion in which a chip of second order is a sinusoid through three of its values [rad]
-WIDEST = 0.5 * PI + 0.1
 #: share of the greatest chip below which a range ends where the feed is tangent to the cutter, not at a wall
 CUSP = 1e-4
 #: least cosine of the immersion at which a wall shortens the chip
@@ -164,7 +162,9 @@ def along_wall(line, lines, cosine, sine, rho, radius):
 
 
 @njit(cache=True, nogil=True)
-def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, share, room, out, own, parent, before):
+def chips(
+    start, given, tooth, piece, slices, runout, angles, turns, alike, share, widest, room, out, own, parent, before
+):  # fmt: skip
     """Ranges of the chips that the true paths of the teeth leave; their number, which may be more than ``out`` holds.
 
     Parameters
@@ -172,6 +172,7 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
     start, given, tooth, piece, slices : of the front, as if each tooth were a circle that the feed moves on
     runout : (2,) [mm, rad]; angles (N,) lag of each tooth; turns (N, N) pitches before tooth j, over 2 pi / N
     share : see :func:`parts_of_lag`
+    widest : widest piece of immersion in which a chip is a sinusoid through three of its values [rad]
     room : (n + 1,) filled: where the ranges of each step begin
     out, own, parent, before : filled: rows, tooth, row of ``given`` and number of teeth before the one that cuts whose
         path it meets; 0: a wall
@@ -181,7 +182,7 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
     rows = round_ranges(given, slices)
     line = np.empty((N + 2, 4))
     radii = np.zeros(N)
-    cut = np.zeros((5, N, N, 3))
+    cut = np.zeros((math.ceil(8.0 / widest), N, N, 3))
     # typed: a literal would compile what it is passed to twice
     at: Any = np.int64(0)
     known: Any = np.int64(-1)
@@ -261,7 +262,7 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
             # the same lines for all parts of the edge; a wall may be met beyond an end by what a tooth stands out
             first = p - reach if cusp_p and not whole else p
             last = q + reach if cusp_q and not whole else q
-            parts = max(1, math.ceil((last - first) / WIDEST - 1e-9))
+            parts = max(1, math.ceil((last - first) / widest - 1e-9))
             for part in range(parts):
                 x = first + (last - first) * part / parts
                 y = first + (last - first) * (part + 1) / parts

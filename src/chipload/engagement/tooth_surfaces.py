@@ -42,6 +42,8 @@ Ints = NDArray[np.int64]
 
 #: share of the chip that may be missed where the edge is divided into parts of one radius
 SHARE = 0.01
+#: widest piece of immersion in which a chip of second order is a sinusoid through three of its values [rad]
+WIDEST = 0.5 * math.pi + 0.1
 #: parts of :func:`chip_error`: at any cut, with runout, of the square of feed over radius, of the runout over the
 #: radial depth
 LEAST, UNLIKE, SECOND, RUNOUT = 0.0025, 0.002, 0.75, 0.04
@@ -71,12 +73,13 @@ def turns_before(cutter: Cutter) -> Floats:
     return np.array([[pitch[(j - np.arange(m)) % N].sum() for m in range(1, N + 1)] for j in range(N)])
 
 
-def chips_of_teeth(front: ToothEngagement, cutter: Cutter) -> ToothEngagement:
+def chips_of_teeth(front: ToothEngagement, cutter: Cutter, widest: float = WIDEST) -> ToothEngagement:
     """Return the chips that the teeth cut, from the engaged front; rows of a single tooth stay as they are.
 
     Parameters
     ----------
     front : engagement ranges of every tooth, h = f sin(phi), with the radius of the cutter
+    widest : widest piece of immersion in which a chip is a sinusoid through three of its values [rad]
 
     Examples
     --------
@@ -95,10 +98,12 @@ def chips_of_teeth(front: ToothEngagement, cutter: Cutter) -> ToothEngagement:
     >>> thin.chip_max().round(5).tolist(), chips_of_teeth(thin, mill).chip_max().round(5).tolist()
     ([0.00894], [0.00788])
     """
-    return chips_and_paths(front, cutter)[0]
+    return chips_and_paths(front, cutter, widest)[0]
 
 
-def chips_and_paths(front: ToothEngagement, cutter: Cutter) -> tuple[ToothEngagement, Ints, Ints]:
+def chips_and_paths(
+    front: ToothEngagement, cutter: Cutter, widest: float = WIDEST
+) -> tuple[ToothEngagement, Ints, Ints]:
     """Return :func:`chips_of_teeth`, of each of its rows the row of ``front``, and how many teeth before the one that
     cuts is that whose path it meets, 0 for a wall.
     """
@@ -110,7 +115,7 @@ def chips_and_paths(front: ToothEngagement, cutter: Cutter) -> tuple[ToothEngage
         room[0] = 0
         count = _tooth_chips.chips(
             front.start, front.rows, front.tooth, front.slice, front.slices, np.array(cutter.runout),
-            cutter.tooth_angles, turns_before(cutter), alike, SHARE, room, out, tooth, parent, before,
+            cutter.tooth_angles, turns_before(cutter), alike, SHARE, widest, room, out, tooth, parent, before,
         )  # fmt: skip
         if count <= guess:
             break
