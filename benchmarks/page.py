@@ -43,7 +43,7 @@ def made(steps: int) -> tuple[Result, dict[str, Blank]]:
         "tool": np.ones(steps, dtype=np.int64), "force_n": 300.0 + 100.0 * np.sin(3.0 * turn),
         "torque_nm": 3.0 + np.sin(5.0 * turn),
     }  # fmt: skip
-    limits = (LimitCheck("force_n", 500.0, float(table["force_n"].max()), Verdict.HOLDS, "program", 10, 1),)
+    limits = (LimitCheck("force_n", 500.0, float(table["force_n"].max()), Verdict.HOLDS, "program", 10, 1, resolution_error=0.0),)
     track = Track("program", TrackKind.PROGRAM, True, float(table["t_s"][-1]), limits, (), (), blocks=in_memory(table))
     result = Result("program", "spiral", (track,), ({"kind": "simulate"},), (), (), Provenance({}, (), "vmc", {}, {}))
     block = trimesh.creation.box(bounds=[[-110.0, -110.0, -30.0], [110.0, 110.0, 0.0]])

@@ -114,6 +114,7 @@ def write_pages() -> None:
 def write_pictures(names: list[str], results: Path) -> None:
     """Take the pictures of some jobs, draw the animation of the contour, and store what they were made from."""
     import animation
+    import live_page
     from pictures import take
 
     values = read_values()
@@ -123,6 +124,8 @@ def write_pictures(names: list[str], results: Path) -> None:
         shown |= {picture: fingerprint(results / name, picture) for picture in SOURCES[name].pictures}
         if name == "contour":
             animation.write(results / name)
+        if name == live_page.EXAMPLE:
+            live_page.write(results / name)
     write_values({**values, "pictures": {p: shown[p] for s in SOURCES.values() for p in s.pictures if p in shown}})
 
 
