@@ -1,6 +1,10 @@
 """The page with a history of 100,000 steps: time to the first picture and until it moves, bytes sent, memory.
 
     python benchmarks/page.py [--steps 100000]
+    python benchmarks/page.py --pictures 3
+
+With ``--pictures`` results of 1,000 and of 100,000 steps are opened in turn, so often each: time to the first picture,
+and the processor time of server and browser until then, in which other work on the computer does not count.
 
 Makes a result by formula (a spiral through a block), serves it, opens it in Chromium without a window. Frames a second
 are those of software GL: no graphics card draws. Also the processor time of making the stock over all rows, and the
@@ -43,7 +47,11 @@ def made(steps: int) -> tuple[Result, dict[str, Blank]]:
         "tool": np.ones(steps, dtype=np.int64), "force_n": 300.0 + 100.0 * np.sin(3.0 * turn),
         "torque_nm": 3.0 + np.sin(5.0 * turn),
     }  # fmt: skip
-    limits = (LimitCheck("force_n", 500.0, float(table["force_n"].max()), Verdict.HOLDS, "program", 10, 1, resolution_error=0.0),)
+    limits = (
+        LimitCheck(
+            "force_n", 500.0, float(table["force_n"].max()), Verdict.HOLDS, "program", 10, 1, resolution_error=0.0
+        ),
+    )
     track = Track("program", TrackKind.PROGRAM, True, float(table["t_s"][-1]), limits, (), (), blocks=in_memory(table))
     result = Result("program", "spiral", (track,), ({"kind": "simulate"},), (), (), Provenance({}, (), "vmc", {}, {}))
     block = trimesh.creation.box(bounds=[[-110.0, -110.0, -30.0], [110.0, 110.0, 0.0]])
@@ -55,11 +63,71 @@ def memory_mb(process: int) -> float:
     return float(re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{process}/status").read_text())[1]) / 1e3  # type: ignore[index]
 
 
+def processor_s(process: int) -> float:
+    """Processor time of a process and of all that it started [s]."""
+    own = {int(p.parent.name): p.read_text().rsplit(")", 1)[1].split() for p in Path("/proc").glob("[0-9]*/stat")}
+    family, ticks = [process], 0
+    for one in family:
+        family += [number for number, fields in own.items() if int(fields[1]) == one]
+        # its own time, and that of children that have ended
+        ticks += sum(map(int, own[one][11:15]))
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def written(steps: int, folder: Path) -> Path:
+    """A result of so many steps in a folder."""
+    result, blanks = made(steps)
+    scene = trimesh.Scene([trimesh.creation.box()]).export(file_type="glb", extension_webp=False)
+    return write_result(result, Presentation(lambda _: [], lambda: scene, blanks=lambda: blanks), folder)
+
+
+def pictures(count: int) -> None:
+    """Print the time to the first picture of a short and of a long history, opened in turn."""
+    from playwright.sync_api import sync_playwright
+
+    sizes = (1_000, 100_000)
+    with tempfile.TemporaryDirectory() as folder:
+        for steps in sizes:
+            written(steps, Path(folder) / f"r{steps}")
+        words = [sys.executable, "-m", "chipload", "view", folder, "--no-open"]
+        server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={**os.environ})
+        try:
+            address = next(m[0] for line in server.stdout if (m := re.search(r"http://\S+", line)))  # type: ignore[union-attr]
+            found: dict[int, list[tuple[float, float]]] = {steps: [] for steps in sizes}
+            with sync_playwright() as p:
+                # the first window loads the libraries of the server
+                for k in range(count + 1):
+                    for steps in sizes:
+                        browser = p.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
+                        page = browser.new_page(viewport={"width": 1280, "height": 720})
+                        page.set_default_timeout(300_000)
+                        start, spent = time.monotonic(), processor_s(os.getpid())
+                        page.goto(f"{address}&show=r{steps}")
+                        page.wait_for_selector(".cv-ramp")
+                        page.wait_for_function(f"{VIEW}.frames > 0")
+                        if k:
+                            found[steps].append((time.monotonic() - start, processor_s(os.getpid()) - spent))
+                        browser.close()
+            least = {steps: tuple(min(one[i] for one in found[steps]) for i in (0, 1)) for steps in sizes}
+            for steps, (wall, spent) in least.items():
+                print(f"{steps} steps: first picture after {wall:.1f} s, {spent:.1f} s of processor time")
+            short, long = (least[steps] for steps in sizes)
+            print(f"ratio: {long[0] / short[0]:.2f} by the clock, {long[1] / short[1]:.2f} by processor time")
+        finally:
+            server.send_signal(signal.SIGINT)
+            server.wait(30)
+
+
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--steps", type=int, default=100_000)
-    steps = parser.parse_args().steps
+    parser.add_argument("--pictures", type=int, metavar="N", help="compare first pictures, opened N times each")
+    given = parser.parse_args()
+    if given.pictures is not None:
+        pictures(given.pictures)
+        return
+    steps = given.steps
     from playwright.sync_api import sync_playwright
 
     with tempfile.TemporaryDirectory() as folder:
