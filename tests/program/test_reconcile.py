@@ -16,7 +16,7 @@ from chipload.program.gcode.tools import read_tool_table
 from chipload.program.read import read_program
 from chipload.program.reconcile import agree
 from chipload.program.setup import Setup
-from chipload.program.tool_comments import stated_diameters
+from chipload.program.tool_comments import stated_diameters, stated_tools
 
 MILL = Cutter(10.0, 4, math.radians(30.0), 20.0, 30.0, 5.8e5, number=1)
 
@@ -143,3 +143,13 @@ def test_the_offset_of_another_tool_is_named_without_a_tool_table(dialect, sever
     for h, found in (("H3", [severity]), ("H4", [])):
         _, findings = read_gcode(f"T4 M6\nG43 {h}\nG0 Z5.\nM30", dialect=dialect)
         assert [f.severity for f in findings if f.code == "nc-length-of-another-tool"] == found
+
+
+@pytest.mark.parametrize("axes", ["X1. Y-.5 F800", "N10 G1 X1 y2", "C90. Z3"])
+def test_a_comment_above_many_motions_describes_no_tool_of_a_later_change(axes: str):
+    change, comment = "T3 M6", "(6 MM FLAT ENDMILL)"
+    motions = "\n".join([axes] * 1200)
+    assert stated_tools(f"{comment}\n{change}\n{motions}\n", 1.0)[3]["diameter_mm"][0] == 6.0
+    assert stated_tools(f"{comment}\n{motions}\n{change}\n{motions}\nM30\n", 1.0) == {}
+    # and one of its own stands among them
+    assert stated_tools(f"{motions}\n{change} {comment}\n{motions}\n", 1.0)[3]["diameter_mm"][0] == 6.0

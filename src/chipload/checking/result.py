@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,6 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import knowledge_text
 from chipload.errors import Finding, Severity
 from chipload.program.block_delete import with_block_delete
-from chipload.program.read import line_times
-from chipload.program.time import slow_machine
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, in_memory
 from chipload.result.limits import Columns
 from chipload.simulation.placement import nothing_cut, stock_placement
@@ -68,10 +67,9 @@ def checked_result(program: ProgramResult) -> Result:
 
 def _time_high(program: ProgramResult) -> float | None:
     """Return the time of the program at the least jerk that its machine may have [s]; None: its time is known."""
-    slow = slow_machine(program.machine)
-    if slow is None:
-        return None
-    return max(float(line_times(program.reading, slow)[1].sum()), float(program.seconds.sum()))
+    reading = program.reading
+    high = (reading if reading.machine is program.machine else replace(reading, machine=program.machine)).seconds_high
+    return None if high is None else max(high, float(program.seconds.sum()))
 
 
 def _unchanged_track(program: ProgramResult) -> Track:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Literal, cast, get_args
 
@@ -34,7 +35,7 @@ from chipload.program.reconcile import agree, unit_mm
 from chipload.program.setup import Setup
 from chipload.program.swivel import Swivel
 from chipload.program.tapping import tapping_findings, thread_comments
-from chipload.program.time import row_times
+from chipload.program.time import row_times, slow_machine
 from chipload.program.to_axes import LIMITS, to_axes
 from chipload.program.to_work import TOLERANCE_MM, axes_of, to_work, work_frame
 from chipload.program.tool_comments import stated_tools
@@ -102,6 +103,20 @@ class ProgramReading:
     def axes(self) -> Floats:
         """(n, 9) float [mm, rad], the machine's own axes at the end of each row of ``commands``; made at each call."""
         return axes_of(self.commands, self.machine, self.placed)
+
+    @cached_property
+    def seconds(self) -> Floats:
+        """(n,) time of each row of the tip on this machine [s]."""
+        rotary = self.machine.chain.rotary
+        out = row_times(self.program, self.machine, self.commands, self.axes if rotary else None)
+        out.setflags(write=False)
+        return out
+
+    @cached_property
+    def seconds_high(self) -> float | None:
+        """Time [s] of the program at the least jerk that the machine may have; None: its time is known."""
+        slow = slow_machine(self.machine)
+        return None if slow is None else float(line_times(self, slow)[1].sum())
 
     @property
     def unchecked(self) -> tuple[str, ...]:
@@ -305,6 +320,8 @@ def _check_program(
 
 def times_of(reading: ProgramReading, machine: Machine) -> Floats:
     """(n,) time of each row of the tip [s], see :mod:`chipload.program.time`."""
+    if machine is reading.machine:
+        return reading.seconds
     return row_times(reading.program, machine, reading.commands, reading.axes if machine.chain.rotary else None)
 
 
@@ -336,10 +353,12 @@ def _sum_by_row(row: Ints, seconds: Floats, n: int) -> Floats:
 
 def line_times(reading: ProgramReading, machine: Machine) -> tuple[Ints, Floats]:
     """Lines of the source that move, (m,) rising, and their times (m,) [s]: sums of :func:`times_of`."""
-    lines = np.unique(np.concatenate([reading.program.line, reading.commands.line]))
-    seconds = np.zeros(len(lines))
-    np.add.at(seconds, np.searchsorted(lines, reading.program.line), times_of(reading, machine))
-    return lines, seconds
+    own = reading.program.line
+    count = max(int(own.max(initial=0)), int(reading.commands.line.max(initial=0))) + 1
+    named = np.zeros(count, dtype=np.bool_)
+    named[own] = named[reading.commands.line] = True
+    lines = np.flatnonzero(named)
+    return lines, np.bincount(own, times_of(reading, machine), count)[lines]
 
 
 def read_tools(path: str | Path) -> ToolTable:

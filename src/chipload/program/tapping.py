@@ -126,7 +126,7 @@ def thread_comments(text: str) -> dict[int, tuple[float, str]]:
     {3: (1.25, 'the comment (T3 M8 TAP)')}
     """
     out: dict[int, tuple[float, str]] = {}
-    for line in text.split("\n"):
+    for line in text.split("\n") if "TAP" in text.upper() else ():
         for comment in COMMENT.finditer(line) if "TAP" in line.upper() else ():
             words = (comment[1] if comment[1] is not None else comment[2]).upper()
             tool = re.search(TOOL, words)

@@ -49,6 +49,12 @@ _SIZE_FIRST = re.compile(r"\s*(?:[0-9]+/[0-9]+|[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9.
 _OPERATION = re.compile(
     r"^\s*(?:[A-Z]+[ -][A-Z -]*(?:MILL|DRILL|BORE|TAP|REAM|CHAMFER)[0-9]{1,2}|[A-Z]+[12])\s*$", re.IGNORECASE
 )
+#: lines of numbers alone that move, as a CAM system writes them: no comment, no tool; so many at once
+_MOTIONS = re.compile(
+    r"(?:^[ \t]*(?:N[0-9]{1,9}[ \t]*)?(?:G0?[0-3](?![0-9.])[ \t]*)?(?:[ABC][ \t]*[-+.0-9]+[ \t]*)*[XYZ][ \t]*[-+.0-9]+"
+    r"(?:[ \t]*[XYZABCIJKF][ \t]*[-+.0-9]+)*[ \t]*\r?\n){1,500}",
+    re.IGNORECASE | re.MULTILINE,
+)
 #: lines above a change of tools whose comments may describe the tool
 ABOVE = 6
 
@@ -61,6 +67,8 @@ def stated_tools(text: str, mm: float) -> dict[int, Stated]:
     mm : in the unit of the text
     """
     out: dict[int, Stated] = {}
+    # of a long program hardly any line speaks of a tool
+    text = _MOTIONS.sub("X0\n", text)
     for number, words, comment in _described_tools(text):
         own = out.setdefault(number, {})
         for key, stated in _statement(words, mm, comment).items():

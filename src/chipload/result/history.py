@@ -13,6 +13,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from chipload.arrow import arrow_array
 from chipload.lazy import pa, pq
 from chipload.result.columns import COLUMNS
 from chipload.result.limits import Columns
@@ -69,7 +70,7 @@ def _schema(result: Result) -> pa.Schema:
     for track in result.tracks:
         first = next(iter(track.blocks()), None)
         for name, values in (first or {}).items():
-            kind = _array(np.asarray(values)).type
+            kind = arrow_array(np.asarray(values)[:1]).type
             if name not in fields:
                 fields[name] = _field(name, kind)
             elif fields[name].type != kind:
@@ -84,12 +85,6 @@ def _field(name: str, kind: Any) -> pa.Field:
     return pa.field(name, kind, metadata={"unit": c.unit, "label": c.label, "meaning": c.meaning})
 
 
-def _array(values: np.ndarray[Any, Any]) -> pa.Array:
-    if values.dtype.kind in "OU":
-        return pa.array(values.astype(str).tolist(), type=pa.string()).dictionary_encode()
-    return pa.array(np.ascontiguousarray(values))
-
-
 def _table(track: Track, block: Columns, schema: pa.Schema) -> pa.Table:
     n = len(next(iter(block.values())))
     extra = sorted(set(block) - set(schema.names))
@@ -101,6 +96,6 @@ def _table(track: Track, block: Columns, schema: pa.Schema) -> pa.Table:
         **block,
     }
     arrays = [
-        _array(np.asarray(given[f.name])).cast(f.type) if f.name in given else pa.nulls(n, f.type) for f in schema
+        arrow_array(np.asarray(given[f.name])).cast(f.type) if f.name in given else pa.nulls(n, f.type) for f in schema
     ]
     return pa.Table.from_arrays(arrays, schema=schema)

@@ -25,6 +25,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from chipload.arrow import arrow_array
 from chipload.errors import InputError
 from chipload.files import FRESH, cannot_write, sweep, write_whole
 from chipload.lazy import pa, pq
@@ -261,7 +262,7 @@ class Checkpoint:
         """Write a chunk; it is valid from the next :meth:`commit` on."""
         self._make()
         name = f"{self.number:06d}.parquet"
-        table = pa.table({k: pa.array(np.ascontiguousarray(v)) for k, v in columns.items()})
+        table = pa.table({k: arrow_array(np.asarray(v)) for k, v in columns.items()})
         sink = pa.BufferOutputStream()
         pq.write_table(table, sink, compression="zstd", use_dictionary=False)
         self.parts.append(self._write(name, sink.getvalue().to_pybytes(), table.num_rows))

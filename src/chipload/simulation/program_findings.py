@@ -124,7 +124,9 @@ def below_stock(program: Program, cutters: Mapping[int, Cutter], low: Floats, hi
     low, high : (3,) float [mm], corners of the box of the stock
     """
     below, above = bounds(program)
-    radius = np.array([cutters[n].radius if n in cutters else 0.0 for n in program.tool.tolist()])
+    radius = np.zeros(len(program))
+    for number, cutter in cutters.items():
+        radius[program.tool == number] = cutter.radius
     lean = radius * np.sqrt(np.maximum(1.0 - np.asarray(program.axis)[:, 2] ** 2, 0.0))
     near = (below[:, :2] - radius[:, None] < high[:2]).all(axis=1) & (above[:, :2] + radius[:, None] > low[:2]).all(
         axis=1

@@ -20,7 +20,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.program.build import LONGEST_ARC
 from chipload.program.motions import is_arc, lengths, radii, rises, spans, starts, straighten_arcs, sweeps
-from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.program import DWELL, LINE, RAPID, Program
 from chipload.program.release import Release
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
@@ -74,7 +74,14 @@ def write_apt(
     tools, speeds, labels = program.tool.tolist(), program.spindle.tolist(), program.label.tolist()
     motions, feeds, arcs, turns = program.motion.tolist(), program.feed.tolist(), arc.tolist(), stands.tolist()
     last = (math.nan, False)
+    # rows that go on as the one before them
+    same = (program.tool, program.spindle, program.label, program.feed, stands, program.motion)
+    goes_on = np.all([np.append(False, column[1:] == column[:-1]) for column in same], axis=0)
+    plain = (goes_on & (program.motion == LINE) & ~tilted).tolist()
     for k in range(len(program)):
+        if plain[k]:
+            out.append(f"GOTO/{ends[k]}")
+            continue
         if tools[k] != tool:
             tool = tools[k]
             if cutters is not None and tool not in cutters and tool != 0:
