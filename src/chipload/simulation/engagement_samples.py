@@ -188,16 +188,22 @@ class EngagementRecorder:
     def __call__(self, cuts: Cuts) -> dict[str, Floats]:
         """Store samples of some of the steps of one cutter."""
         # films that are thinner than the tolerance engage no edge
-        engaged = np.diff(cuts.engagement.start) > 0
-        chosen = np.flatnonzero((np.asarray(cuts.step) % self.stride == 0) & engaged)
-        if len(chosen):
-            some = _engagement_at(cuts.engagement, chosen)
-            own = np.asarray(cuts.step)[chosen]
-            self.parts.append(engagement_samples(some, cuts.cutter, self.material, own, cuts.tool, self.stride))
-        while sum(map(len, self.parts)) > self.steps or sum(len(p.ranges) for p in self.parts) > self.ranges:
+        step, ranges = np.asarray(cuts.step), np.diff(cuts.engagement.start)
+        chosen = np.flatnonzero((step % self.stride == 0) & (ranges > 0))
+        # those that would not be kept are not calculated
+        while (
+            sum(map(len, self.parts)) + len(chosen) > self.steps
+            or sum(len(p.ranges) for p in self.parts) + int(ranges[chosen].sum()) > self.ranges
+        ):
             self.stride *= 2
             thinner = [p.every(self.stride // p.stride) for p in self.parts]
             self.parts = [p for p in thinner if len(p)]
+            chosen = chosen[step[chosen] % self.stride == 0]
+        if len(chosen):
+            some = _engagement_at(cuts.engagement, chosen)
+            self.parts.append(
+                engagement_samples(some, cuts.cutter, self.material, step[chosen], cuts.tool, self.stride)
+            )
         return {}
 
     def samples(self) -> EngagementSamples | None:

@@ -13,19 +13,24 @@ import math
 import numpy as np
 from numba import njit
 
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
+
 #: columns of ``found``: depth of a rapid, depth of a contact, its band, its place
 RAPID_DEPTH, CONTACT, BAND, PLACE_X, PLACE_Y, PLACE_Z = range(6)
 #: what a height may differ by rounding [mm]
 EPS = 1e-7
-#: places along a step at which a contact on a slope is examined, and halvings of the search for the lowest height
-PLACES, SEARCHES = 17, 25
+#: places along a step at which a contact on a slope is examined, and thirds of the search for the lowest height; share
+#: of the time beside an end at which the height rises from it: the lowest is within 2e-6 of the radius
+PLACES, SEARCHES, BESIDE = 17, 16, 1e-3
 #: a step that is shorter than this share of the radius is short
 SHORT = 0.1
+#: share by which rounding may lengthen a short step
+ROUNDED = 1e-9
 
 _F1, _F2, _F3 = "float64[::1]", "float64[:,::1]", "float64[:,:,::1]"
 
 
-@njit("float64(float64, float64, float64[:,::1])", cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def height(d2, radius, table):
     """Height g at the square of a distance, by a table (2, m).
 
@@ -44,43 +49,51 @@ def height(d2, radius, table):
     return table[row, k] + (at - k) * (table[row, k + 1] - table[row, k])
 
 
-@njit("float64(float64, float64, float64, float64[::1], float64, float64[:,::1])", cache=True, nogil=True)
-def at_time(t, qx, qy, u, radius, table):
+@njit(cache=True, nogil=True, inline="always")
+def at_time(t, qx, qy, ux, uy, uz, radius, table):
     """Height of the tool's surface over a point at a time of a step, above the tip at its start."""
-    dx = qx - t * u[0]
-    dy = qy - t * u[1]
-    return t * u[2] + height(dx * dx + dy * dy, radius, table)
+    dx = qx - t * ux
+    dy = qy - t * uy
+    return t * uz + height(dx * dx + dy * dy, radius, table)
 
 
-@njit("float64(float64, float64, float64[::1], float64, float64[:,::1], float64, boolean)", cache=True, nogil=True)
-def lowest(qx, qy, u, radius, table, near, flat):
+@njit(cache=True, nogil=True)
+def lowest(qx, qy, ux, uy, uz, radius, table, near, flat):
     """Least height of the tool's surface over a point during a step, above the tip at its start.
 
-    (qx, qy): the point from the start; u (3,): the motion; ``near``: time at which the axis is nearest to the point,
-    which is then within ``radius`` of it.
+    (qx, qy): the point from the start; (ux, uy, uz): the motion; ``near``: time at which the axis is nearest to the
+    point, which is then within ``radius`` of it.
     """
-    h2 = u[0] * u[0] + u[1] * u[1]
+    h2 = ux * ux + uy * uy
     if h2 == 0.0:
-        return min(u[2], 0.0) + height(qx * qx + qy * qy, radius, table)
-    if u[2] == 0.0:
-        return at_time(near, qx, qy, u, radius, table)
+        return min(uz, 0.0) + height(qx * qx + qy * qy, radius, table)
+    if uz == 0.0:
+        return at_time(near, qx, qy, ux, uy, uz, radius, table)
     # the times at which the point is under the tool
-    along = qx * u[0] + qy * u[1]
-    off2 = (qx * u[1] - qy * u[0]) ** 2 / h2
+    along = qx * ux + qy * uy
+    off2 = (qx * uy - qy * ux) ** 2 / h2
     span = math.sqrt(max(radius * radius - off2, 0.0) / h2)
     a = max(along / h2 - span, 0.0)
     b = min(along / h2 + span, 1.0)
     if flat:
-        return (a if u[2] > 0.0 else b) * u[2]
-    best = min(at_time(near, qx, qy, u, radius, table), at_time(a, qx, qy, u, radius, table))
-    best = min(best, at_time(b, qx, qy, u, radius, table))
+        return (a if uz > 0.0 else b) * uz
+    best = at_time(near, qx, qy, ux, uy, uz, radius, table)
+    at_a = at_time(a, qx, qy, ux, uy, uz, radius, table) if a != near else best
+    at_b = at_time(b, qx, qy, ux, uy, uz, radius, table) if b != near else best
+    best = min(best, at_a, at_b)
     # convex in the time: a short step is known by its ends and its nearest place
-    if h2 > (SHORT * radius) ** 2:
+    if h2 > (SHORT * radius) ** 2 * (1.0 + ROUNDED) and a < b:
+        # lowest at an end from which it rises: most columns are before or behind the tool
+        beside = BESIDE * (b - a)
+        if at_time(a + beside, qx, qy, ux, uy, uz, radius, table) >= at_a:
+            return best
+        if at_time(b - beside, qx, qy, ux, uy, uz, radius, table) >= at_b:
+            return best
         for _ in range(SEARCHES):
             t0 = a + (b - a) / 3.0
             t1 = b - (b - a) / 3.0
-            v0 = at_time(t0, qx, qy, u, radius, table)
-            v1 = at_time(t1, qx, qy, u, radius, table)
+            v0 = at_time(t0, qx, qy, ux, uy, uz, radius, table)
+            v1 = at_time(t1, qx, qy, ux, uy, uz, radius, table)
             best = min(best, v0, v1)
             if v0 < v1:
                 b = t1
@@ -127,6 +140,9 @@ def lower(first, p0, p1, tool, rapid, cutters, tables, bands, grid, top, low, ce
     gone, last : (nx, ny) step that cut a column through, and that cut it last
     film : what is less deep is none [mm]
     """
+    # the caller keeps all of them
+    p0, p1, cutters, tables, bands, grid = borrow_arrays((p0, p1, cutters, tables, bands, grid))
+    top, low, ceiling, found = borrow_arrays((top, low, ceiling, found))
     nx, ny = top.shape
     wx = grid[2] * tile
     wy = grid[3] * tile
@@ -135,20 +151,25 @@ def lower(first, p0, p1, tool, rapid, cutters, tables, bands, grid, top, low, ce
         k = tool[s]
         radius = cutters[k, 0]
         flat = cutters[k, 2] > 0.0
-        u = p1[s] - p0[s]
-        bottom = p0[s, 2] + min(u[2], 0.0)
-        upper = p0[s, 2] + max(u[2], 0.0)
+        table = borrow_arrays(tables[k])
+        ux = p1[s, 0] - p0[s, 0]
+        uy = p1[s, 1] - p0[s, 1]
+        uz = p1[s, 2] - p0[s, 2]
+        bottom = p0[s, 2] + min(uz, 0.0)
+        upper = p0[s, 2] + max(uz, 0.0)
         if bottom >= grid[4]:
             continue
         reach = radius
         for b in range(bands.shape[1]):
             if bands[k, b, 0] > 0.0 and bottom + bands[k, b, 1] < grid[4]:
                 reach = max(reach, bands[k, b, 0])
-        h2 = u[0] * u[0] + u[1] * u[1]
-        i0 = max(math.floor((p0[s, 0] + min(u[0], 0.0) - reach - grid[0]) / wx), 0)
-        i1 = min(math.floor((p0[s, 0] + max(u[0], 0.0) + reach - grid[0]) / wx), ceiling.shape[0] - 1)
-        j0 = max(math.floor((p0[s, 1] + min(u[1], 0.0) - reach - grid[1]) / wy), 0)
-        j1 = min(math.floor((p0[s, 1] + max(u[1], 0.0) + reach - grid[1]) / wy), ceiling.shape[1] - 1)
+        # beyond it there is nothing of the tool, whatever is rounded
+        far2 = reach * reach * (1.0 + 1e-12)
+        h2 = ux * ux + uy * uy
+        i0 = max(math.floor((p0[s, 0] + min(ux, 0.0) - reach - grid[0]) / wx), 0)
+        i1 = min(math.floor((p0[s, 0] + max(ux, 0.0) + reach - grid[0]) / wx), ceiling.shape[0] - 1)
+        j0 = max(math.floor((p0[s, 1] + min(uy, 0.0) - reach - grid[1]) / wy), 0)
+        j1 = min(math.floor((p0[s, 1] + max(uy, 0.0) + reach - grid[1]) / wy), ceiling.shape[1] - 1)
         for ti in range(i0, i1 + 1):
             for tj in range(j0, j1 + 1):
                 highest = ceiling[ti, tj]
@@ -156,9 +177,12 @@ def lower(first, p0, p1, tool, rapid, cutters, tables, bands, grid, top, low, ce
                     continue
                 qx = grid[0] + (ti + 0.5) * wx - 0.5 * grid[2] - p0[s, 0]
                 qy = grid[1] + (tj + 0.5) * wy - 0.5 * grid[3] - p0[s, 1]
-                t = min(max((qx * u[0] + qy * u[1]) / h2, 0.0), 1.0) if h2 > 0.0 else 0.0
-                away = math.hypot(qx - t * u[0], qy - t * u[1]) - half
-                near = away <= radius
+                t = min(max((qx * ux + qy * uy) / h2, 0.0), 1.0) if h2 > 0.0 else 0.0
+                away = math.hypot(qx - t * ux, qy - t * uy) - half
+                # the surface rises with the distance from the axis
+                near = away <= radius and (
+                    flat or highest > bottom + height(max(away, 0.0) * max(away, 0.0), radius, table)
+                )
                 for b in range(bands.shape[1]):
                     if away <= bands[k, b, 0] and bottom + bands[k, b, 1] < highest:
                         near = True
@@ -173,18 +197,22 @@ def lower(first, p0, p1, tool, rapid, cutters, tables, bands, grid, top, low, ce
                             continue
                         qx = grid[0] + i * grid[2] - p0[s, 0]
                         qy = grid[1] + j * grid[3] - p0[s, 1]
-                        t = min(max((qx * u[0] + qy * u[1]) / h2, 0.0), 1.0) if h2 > 0.0 else 0.0
-                        d = math.sqrt((qx - t * u[0]) ** 2 + (qy - t * u[1]) ** 2)
+                        t = min(max((qx * ux + qy * uy) / h2, 0.0), 1.0) if h2 > 0.0 else 0.0
+                        d2 = (qx - t * ux) ** 2 + (qy - t * uy) ** 2
+                        if d2 > far2:
+                            rest = max(rest, c)
+                            continue
+                        d = math.sqrt(d2)
                         # what stands above the flutes stays
                         inside = d <= radius and c <= upper + cutters[k, 1] + EPS
-                        if inside and not flat and c <= bottom + height(d * d, radius, tables[k]):
+                        if inside and not flat and c <= bottom + height(d * d, radius, table):
                             inside = False
                         if inside:
-                            z = p0[s, 2] + lowest(qx, qy, u, radius, tables[k], t, flat)
+                            z = p0[s, 2] + lowest(qx, qy, ux, uy, uz, radius, table, t, flat)
                             if z < c:
                                 top[i, j] = z
                                 # a film that chords left beside the way is narrow, however high
-                                beside = abs(qx * u[1] - qy * u[0]) / math.sqrt(h2) if h2 > 0.0 else d
+                                beside = abs(qx * uy - qy * ux) / math.sqrt(h2) if h2 > 0.0 else d
                                 if c - z > film and radius - beside > film:
                                     last[i, j] = first + s
                                     if rapid[s] and c - z > found[s, RAPID_DEPTH]:
@@ -197,7 +225,7 @@ def lower(first, p0, p1, tool, rapid, cutters, tables, bands, grid, top, low, ce
                         for b in range(bands.shape[1]):
                             r = bands[k, b, 0]
                             if d < r and c > bottom + bands[k, b, 1] + film:
-                                depth = depth_in(qx, qy, c - p0[s, 2], u, r, bands[k, b, 1])
+                                depth = depth_in(qx, qy, c - p0[s, 2], p1[s] - p0[s], r, bands[k, b, 1])
                                 if depth > film and depth > found[s, CONTACT]:
                                     found[s, CONTACT] = depth
                                     found[s, BAND] = b

@@ -38,7 +38,7 @@ Ints = NDArray[np.int64]
 #: columns over the least radius of a cutter, and most columns
 FINE, MOST = 20.0, 1_000_000
 #: columns along the side of a tile, and entries of the table of a cutter's surface
-TILE, TABLE = 16, 1025
+TILE, TABLE = 8, 1025
 #: a depth of less than so many tolerances of the path is a film left by chords
 FILM = 4.0
 #: a step after all others
