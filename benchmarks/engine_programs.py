@@ -77,8 +77,19 @@ def roughing(moves: int) -> Program:
     )  # fmt: skip
 
 
+def leaning(moves: int) -> Program:
+    """The finishing program with an axis that leans by up to 15 deg and turns from point to point."""
+    program = finishing(moves)
+    x, y = program.p_work[:, 0], program.p_work[:, 1]
+    axis = np.column_stack([0.2 * np.sin(x / 9.0), 0.15 * np.cos(y / 8.0), np.ones(len(x))])
+    return replace(program, axis=axis / np.linalg.norm(axis, axis=1)[:, None])
+
+
 def made(name: str, moves: int) -> Case:
-    """Finishing over a wave by a ball nose, or roughing by a flat mill."""
+    """Finishing over a wave by a ball nose, upright or (``five axes``) leaning, or roughing by a flat mill."""
+    if name == "five axes":
+        high = (106.0, float(finishing(moves).p_work[:, 1].max()) + 6.0, 0.0)
+        return Case(name, "ball", leaning(moves), {1: BALL}, (-6.0, -6.0, -8.0), high, 0.25, 3.0)
     if name == "finishing":
         program = finishing(moves)
         high = (106.0, float(program.p_work[:, 1].max()) + 6.0, 0.0)

@@ -3,12 +3,13 @@
 Processor seconds, so that other work on the computer counts little; memory is the most that a process had.
 
 - `check` of an example, in a process of its own, its files compiled to byte code before;
-- jobs of a flat roughing and of a ball finishing program by the command line (reading, simulation, checks, report)
-  over their kernel, contact and loads of the same moves, and the shares of reading, contact, loads, outlines, checks
-  and files in the same job within this process; the processor seconds until the verdict is shown;
+- jobs of a flat roughing, of a ball finishing and of a five-axis program by the command line (reading, simulation,
+  checks, report) over their kernel, contact and loads of the same moves at the same resolution, and the shares of
+  reading, contact, loads, outlines, checks and files in the same job within this process; the processor seconds until
+  the verdict is shown;
 - how much faster the kernel is on 2 and 4 threads with a core each: its processor time over that of its busiest thread
   and of the main thread, which works for all (``--threads`` alone, with ``--moves``);
-- the exponent of time over the number of moves, and the memory of the longest job.
+- the exponent of time over the number of moves, and time and memory of a further move in a job.
 
 ``--quick``: 1,000 and 5,000 moves, about a minute of processor time; start and report are then most of a job, and only
 the goals of `check` and of memory are compared. Else 10,000 and 100,000 moves, and ``--moves`` states others.
@@ -36,23 +37,28 @@ from engine_programs import made
 from engines import ALLOY
 
 from chipload import examples
+from chipload.checking.preparation import resolution_of
+from chipload.checking.settings import SimulationSettings
 from chipload.jobs import load_job, run_job
+from chipload.program.apt.writer import write_apt
+from chipload.program.release import Release
 from chipload.simulation import strips
 from chipload.simulation.chips import remove
 from chipload.stock.layers import LayeredStock
-from simulation import RESOLUTION
 
 #: goals: check [s], a job over its kernel, memory of the longest job [MB]; by how much a goal may be missed
 CHECK_S, OVER_KERNEL, MEMORY_MB, MISSED = 0.4, 2.0, 400.0, 1.2
-NAMES = ("roughing", "finishing")
+NAMES = ("roughing", "finishing", "five axes")
+#: goals of the contact and the loads of a move [us]; longest step of the jobs [mm]
+KERNEL_US, STEP_MM = {"finishing": 20.0, "five axes": 300.0}, 1.0
 QUICK, WHOLE = (1_000, 5_000), (10_000, 100_000)
 #: moves below which start and report are most of a job, so that no goal of time is stated
 SHORT = 50_000
 WORDS = ("G21 G90 G17 G94", "T1 M6", "S9549 M3")
 JOB = """[program]
-file = "moves.ngc"
+file = "{file}"
 [machine]
-name = "vmc"
+name = "{machine}"
 [stock]
 low_mm = {low}
 high_mm = {high}
@@ -69,7 +75,7 @@ overhang_mm = 40.0
 modulus_gpa = 600.0
 [[operation]]
 kind = "simulate"
-step_mm = 1.0
+step_mm = {step}
 [limits]
 force_n = 1500.0
 """
@@ -151,18 +157,34 @@ def write_job(name: str, moves: int, folder: Path) -> Path:
     rows = [f"X{x:.3f} Y{y:.3f} Z{z:.4f}" for x, y, z in p[1:].tolist()]
     (folder / "moves.ngc").write_text("\n".join([*WORDS, *begin, *rows, "G0 Z20", "M30", ""]))
     c, (low, high) = case.cutters[1], ([*map(float, corner)] for corner in (case.low, case.high))
-    text = JOB.format(low=low, high=high, diameter=c.diameter, corner=c.corner_radius, flutes=c.flutes)
+    file, machine = "moves.ngc", "vmc"
+    if name == "five axes":
+        file, machine = "moves.apt", "xyzac-trunnion"
+        (folder / file).write_text(write_apt(case.program, case.cutters, title=name, release=Release("a benchmark")))
+    text = JOB.format(
+        step=STEP_MM,
+        file=file,
+        machine=machine,
+        low=low,
+        high=high,
+        diameter=c.diameter,
+        corner=c.corner_radius,
+        flutes=c.flutes,
+    )
     (folder / "job.toml").write_text(text)
     return folder / "job.toml"
 
 
 def kernel(name: str, moves: int, workers: int = 1) -> float:
-    """Processor seconds of contact and loads of a program, without checks, errors and outlines."""
+    """Processor seconds of contact and loads of a program at the resolution of a job, without checks, errors and
+    outlines.
+    """
     case = made(name, moves)
+    fine = resolution_of(SimulationSettings(STEP_MM), case.cutters, case.program)
     stock = LayeredStock.block(case.low, case.high, 4.0 * case.layer_mm, 40.0)
     begun = time.process_time()
     remove(
-        case.program, stock, case.cutters, ALLOY, RESOLUTION, engine="moves", accuracy=False, outlines=False,
+        case.program, stock, case.cutters, ALLOY, fine, engine="moves", accuracy=False, outlines=False,
         workers=workers,
     )  # fmt: skip
     return time.process_time() - begun
@@ -218,15 +240,15 @@ def shares(job: Path) -> dict[str, float]:
     return {part: seconds / whole for part, seconds in took.items()} | {"all [s]": whole}
 
 
-def measured(moves: Sequence[int], byte_code: str) -> list[Row]:
+def measured(names: Sequence[str], moves: Sequence[int], byte_code: str) -> list[Row]:
     """Every row of the table; the shares are printed as they are found."""
     check = ["check", str(Path(examples.__file__).parent / "feeds" / "job.toml")]
     command(check, byte_code)
     seconds, memory, _ = command(check, byte_code)
     table = [Row("check of the example feeds", CHECK_S, seconds, "s"), Row("its memory", math.nan, memory, "MB")]
-    for name in NAMES:
+    for name in names:
         kernel(name, 300)
-        times = list[float]()
+        times, held = list[float](), list[float]()
         for n in moves:
             with tempfile.TemporaryDirectory() as folder:
                 job = write_job(name, n, Path(folder))
@@ -235,26 +257,29 @@ def measured(moves: Sequence[int], byte_code: str) -> list[Row]:
                     found = shares(job)
                     print(f"{name}, {n} moves:", ", ".join(f"{k} {v:.2f}" for k, v in found.items()), flush=True)
                 run = ["run", str(job), "--out", str(Path(folder) / "result")]
-                if name == "roughing" and n == moves[0]:
+                if name == names[0] and n == moves[0]:
                     # writes the byte code
                     command(run, byte_code)
                 seconds, memory, shown = command(run, byte_code)
             own = kernel(name, n)
             times.append(seconds)
+            held.append(memory)
             work, goal = f"{name}, {n} moves", OVER_KERNEL if n >= SHORT else math.nan
             table += [
                 Row(f"{work}: job", math.nan, seconds, "s"),
                 Row(f"{work}: of it until the verdict", math.nan, shown, "s"),
-                Row(f"{work}: kernel a move", math.nan, 1e6 * own / n, "us"),
+                Row(f"{work}: kernel a move", KERNEL_US.get(name, math.nan), 1e6 * own / n, "us"),
                 Row(f"{work}: job over kernel", goal, seconds / own, "times"),
                 Row(f"{work}: memory", MEMORY_MB, memory, "MB"),
             ]
-        if moves[-1] < SHORT:
+        if len(moves) < 2:
             continue
         grows = math.log(times[-1] / times[0]) / math.log(moves[-1] / moves[0])
         table.append(Row(f"{name}: exponent of the time of a job", math.nan, grows, ""))
         added = 1e6 * (times[-1] - times[0]) / (moves[-1] - moves[0])
         table.append(Row(f"{name}: time of a further move in a job", math.nan, added, "us"))
+        added = 1e6 * (held[-1] - held[0]) / (moves[-1] - moves[0])
+        table.append(Row(f"{name}: memory of a further move in a job", math.nan, added, "bytes"))
     return table
 
 
@@ -273,14 +298,15 @@ def main() -> None:
     ask.add_argument("--quick", action="store_true", help="few moves")
     ask.add_argument("--check", action="store_true", help="exit 1 where a goal is missed by more than 20 %%")
     ask.add_argument("--moves", type=int, nargs="+", default=None, help="lengths of the programs, ascending")
+    ask.add_argument("--names", nargs="+", choices=NAMES, default=NAMES, help="programs")
     ask.add_argument("--threads", action="store_true", help="only the kernel on 2 and 4 threads")
     given = ask.parse_args()
     if given.threads:
-        table = [row for n in given.moves or (20_000,) for name in NAMES for row in thread_rows(name, n)]
+        table = [row for n in given.moves or (20_000,) for name in given.names for row in thread_rows(name, n)]
         print_table(table)
         return
     with tempfile.TemporaryDirectory() as byte_code:
-        table = measured(given.moves or (QUICK if given.quick else WHOLE), byte_code)
+        table = measured(given.names, given.moves or (QUICK if given.quick else WHOLE), byte_code)
     print_table(table)
     if given.check and any(row.missed() for row in table):
         sys.exit(1)
