@@ -105,6 +105,26 @@ def test_a_clock_that_jumps_is_named(log, program):
         align_log("log", replace(log, time=time), log.power, program)
 
 
+@pytest.mark.parametrize("factor", [1e-3, 10.0, 1e3])
+def test_unit_of_the_clock_is_named_by_its_lines(log, program, factor):
+    """Lines align any clock: one in milliseconds would be taken as a program that lasts a thousand times as long."""
+    place = np.arange(0.0, program.time[-1], 0.1)
+    row = np.searchsorted(program.time, place)
+    power = 2e5 + (program.cutting + program.edge)[row] * program.speed[row]
+    known = SpindleLog(factor * place, power=power, line=program.line[row].astype(float))
+    with pytest.raises(InputError, match=rf"check the unit of its time \(a factor of {factor:g}\)"):
+        align_log("log", known, known.power, program)
+
+
+def test_lines_of_another_program(log, program):
+    """No line of the log is one of the program: it is aligned by its load, and refused by it."""
+    other = closed_form_program(np.random.default_rng(99))
+    with pytest.raises(InputError, match="it is the log of another program"):
+        align_log("log", replace(log, line=np.full(len(log.time), 1e6)), log.power, other)
+    found = align_log("log", replace(log, line=np.zeros(len(log.time))), log.power, program)
+    assert found.correlation > 0.9
+
+
 def test_missing_stock_is_named(log, program):
     """Air in five lines where the program cuts: the lines are named and do not enter the coefficients."""
     aligned = align_log("log", log, log.power, program)

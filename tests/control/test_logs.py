@@ -35,6 +35,13 @@ def test_columns_and_units(path):
     assert [(f.code, f.line) for f in findings] == [("log-row", 4)]
 
 
+def test_semicolons_are_named(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_s;power_w\n0,1;100,5\n")
+    with pytest.raises(InputError, match="separated by semicolons"):
+        read_log(path)
+
+
 def test_time_that_does_not_rise(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("t,I\n0,1\n2,1\n1,5\n2,6\n3,1\n")

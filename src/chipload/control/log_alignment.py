@@ -10,6 +10,7 @@ Notation: t time [s], w spindle speed [rad/s].
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -29,6 +30,8 @@ Floats = NDArray[np.float64]
 LEAST_CORRELATION = 0.8
 #: how much longer than calculated a program may take on the machine, and how much shorter
 RATES = (0.8, 1.5)
+#: how much longer or shorter than calculated half of the lines of a log may last: a tenth of the feed, or its unit
+MOST_LONGER = 8.0
 #: greatest feed override of a control
 MOST_OVERRIDE = 3.0
 #: samples of the search for lag and rate, and rates that are tried
@@ -167,7 +170,7 @@ def align_log(
             )
         clock = np.concatenate([[0.0], np.cumsum(np.diff(log.time) * log.override[1:])])
     lag, rate = 0.0, 1.0
-    place = None if log.line is None else _time_by_line(log.line, clock, predicted, start)
+    place = None if log.line is None else _time_by_line(name, log.line, clock, predicted, start)
     if place is None:
         lag, rate = _lag_and_rate(clock, signal, predicted.time, start, load, sensor_lag)
         place = (clock - lag) / rate
@@ -203,14 +206,21 @@ def _gaps(name: str, time: Floats) -> list[Finding]:
     return [Finding("log-gap", 0, text, Severity.NOTE)]
 
 
-def _time_by_line(line: Floats, clock: Floats, predicted: PredictedTorque, start: Floats) -> Floats | None:
+def _time_by_line(name: str, line: Floats, clock: Floats, predicted: PredictedTorque, start: Floats) -> Floats | None:
     """Return the time of the history of each sample, by the first sample of each line; None: no two lines are shared.
 
     Lines that run again, as in a loop, count where they run first.
+
+    Raises
+    ------
+    InputError
+        Half of the lines last much longer or shorter than calculated, as if the clock had another unit.
     """
     logged, first = np.unique(np.asarray(line, dtype=np.int64), return_index=True)
     lines, row = np.unique(predicted.line, return_index=True)
     _, a, b = np.intersect1d(logged, lines, assume_unique=True, return_indices=True)
+    if len(a) < 2:
+        return None
     at, then = clock[first[a]], start[row[b]]
     order = np.argsort(then, kind="stable")
     at, then = at[order], then[order]
@@ -218,6 +228,13 @@ def _time_by_line(line: Floats, clock: Floats, predicted: PredictedTorque, start
     at, then = at[rises], then[rises]
     if len(at) < 2:
         return None
+    lasts = np.diff(then) > 0.0
+    longer = float(np.median(np.diff(at)[lasts] / np.diff(then)[lasts])) if lasts.any() else 1.0
+    if not 1.0 / MOST_LONGER < longer < MOST_LONGER:
+        raise InputError(
+            f"{name}: half of its lines last {longer:.3g} times as long as calculated, at most {MOST_LONGER:g} times "
+            f"is believed: check the unit of its time (a factor of {10.0 ** round(math.log10(longer)):g})"
+        )
     out = np.interp(clock, at, then, left=-1.0)
     # the last line ends when the history does, at the pace of the lines before it
     pace = (then[-1] - then[0]) / max(at[-1] - at[0], np.finfo(np.float64).tiny)

@@ -225,6 +225,10 @@ def _by_name(label: str, names: list[str]) -> _Columns:
         if quantity and quantity not in wanted:
             wanted[quantity] = (name, unit)
     if "time" not in wanted or not LOADS & set(wanted):
+        if len(names) == 1 and ";" in names[0]:
+            raise InputError(
+                f"{label}: its columns are separated by semicolons: export it with commas, and a point in its numbers"
+            )
         raise InputError(
             f"{label}: no column of time and of current, power or torque by a known name, as time_s and current_a: "
             "state --columns, a TOML file that names them"
