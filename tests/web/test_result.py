@@ -180,6 +180,14 @@ def test_rows_follow_the_lines_of_a_text_that_numbers_otherwise(root: Path) -> N
     # sides of the square are the lines 7 to 10 of the CL data too, by another count: its GOTOs
     goto = [k for k, text in enumerate(CL.splitlines(), 1) if text.startswith("GOTO")][1:]
     assert other.of_row.tolist() == np.repeat(goto, ROWS // 4).tolist()
+    # a text whose axes do not stand where the tool cuts, as that of a turning table, is not followed
+    away = "".join(f"GOTO/{x},500,500,0,0,1\n" for x in (0, 10, 20))
+    (root / "r" / "1-away.apt").write_text(f"PARTNO/AWAY\nUNITS/MM\nFEDRAT/100,MMPM\n{away}FINI\n")
+    path = root / "r" / "summary.json"
+    path.write_text(path.read_text().replace('"0-program.apt"', '"1-away.apt","0-program.apt"'))
+    both = open_result(root, "r")
+    assert [Path(name).name for name in both.tracks[0].own.programs][:2] == ["1-away.apt", "0-program.apt"]
+    assert source_of(both, both.tracks[0]).name == "0-program.apt"
 
 
 def test_a_text_with_new_feeds_is_shown_in_the_place_of_the_old_one(root: Path) -> None:

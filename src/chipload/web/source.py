@@ -78,8 +78,12 @@ def source_of(result: PageResult, track: PageTrack) -> TrackText | None:
             program = read_apt_file(path)[0] if path.suffix == ".apt" else _read_axes(path, result)
         except (ChiploadError, OSError):
             continue
-        if program is not None:
-            return TrackText(path.name, _lines(path), follow_lines(track.place, program), note)
+        if program is None:
+            continue
+        lines = follow_lines(track.place, program)
+        # the axes of a machine whose table turns do not stand where the tool cuts: its program is not followed
+        if len(np.unique(lines)) > 1 or len(np.unique(track.place, axis=0)) == 1:
+            return TrackText(path.name, _lines(path), lines, note)
     return None
 
 
