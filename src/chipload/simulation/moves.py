@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import MultiPolygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.record import cutter_record
@@ -39,6 +40,7 @@ from chipload.lazy import LateModule
 from chipload.program.program import Program
 from chipload.simulation.initial_stock import initial_stock, make_earlier, moves_of, skip_moves
 from chipload.simulation.loads import BANDS, LOADS, ONE_SIDE, Cuts, engaged_work
+from chipload.simulation.section_outlines import nested_outlines
 from chipload.simulation.shank import ShankContact
 from chipload.simulation.steps import ROWS, Steps, steps_in_blocks
 from chipload.stock.earlier_moves import EarlierMoves
@@ -176,13 +178,26 @@ class MoveRun:
         """Remove the swept volume of the moves from the layers, with a number of threads, and store the moves there."""
         low = self.stock.lowest()
         at = [i for i, z in enumerate(stock.heights.tolist()) if z > low]
-        with ThreadPoolExecutor(workers) as pool:
-            shapes = list(pool.map(lambda i: self.stock.outlines(float(stock.heights[i]), 0.5 * self.tolerance), at))
+        heights = stock.heights[at].tolist()
+
+        def outlines(z: float) -> MultiPolygon:
+            return self.stock.outlines(z, 0.5 * self.tolerance)
+
+        if self.upright:
+            shapes = nested_outlines(outlines, heights, self._levels(), workers)
+        else:
+            with ThreadPoolExecutor(workers) as pool:
+                shapes = list(pool.map(outlines, heights))
         # of a body that is not stored with the stock its layers are all that will be known
         moves = moves_of(self.stock) if self.stock.body is stock.part else None
         self.stock.forget()
         stock.remove_many([i for i, s in zip(at, shapes, strict=True) if not s.is_empty], [s for s in shapes if s])
         stock.earlier = moves
+
+    def _levels(self) -> Floats:
+        """Return the heights (m,) [mm] at which the stock was cut level."""
+        moves = self.stock.moves[: self.stock.count]
+        return np.unique(moves[moves[:, 5] == 0.0, 2])
 
     def _moving(self, steps: Steps) -> NDArray[np.bool_]:
         """Return a mask (n,) of the steps of tools that cut, not of bodies without chips."""

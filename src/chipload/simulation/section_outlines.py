@@ -1,0 +1,69 @@
+"""Outlines of the swept area at many heights, each distinct one found once.
+
+A cutter of :class:`~chipload.engagement.moves.stock.MoveStock` is open above, so that what it sweeps at a height it
+sweeps at each greater height too. Where two heights have the same outlines, all heights between them have these. A
+program that cuts level has a few distinct sections, and its stock hundreds of layers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely import MultiPolygon
+
+Floats = NDArray[np.float64]
+
+
+def nested_outlines(
+    outlines: Callable[[float], MultiPolygon], heights: Sequence[float], levels: Floats, workers: int
+) -> list[MultiPolygon]:
+    """Return the outlines at rising heights of an area that grows with the height.
+
+    Between two heights with the same outlines none is calculated; the others are halved by number until each has its
+    own. Equal heights share one object.
+
+    Parameters
+    ----------
+    outlines : finds those at a height [mm]
+    heights : (n,) [mm], rising
+    levels : (m,) float [mm], where the area is expected to grow; the result does not depend on them
+    workers : threads
+
+    Examples
+    --------
+    >>> from shapely import MultiPolygon, box
+    >>> asked = []
+    >>> def steps(z):
+    ...     asked.append(z)
+    ...     return MultiPolygon([box(0, 0, 1 + z // 10, 1)])
+    >>> found = nested_outlines(steps, range(20), np.array([10.0]), 1)
+    >>> [shape.area for shape in found] == [1.0] * 10 + [2.0] * 10, sorted(asked)
+    (True, [0, 9, 10, 19])
+    """
+    count = len(heights)
+    if not count:
+        return []
+    first = np.unique(np.clip(np.searchsorted(np.asarray(heights, dtype=np.float64), levels), 1, count))
+    ends = [0, *(int(k) for k in first.tolist()), count]
+    spans = [(a, b - 1) for a, b in pairwise(ends) if b > a]
+    known: dict[int, MultiPolygon] = {}
+    with ThreadPoolExecutor(workers) as pool:
+        while spans:
+            wanted = sorted({k for span in spans for k in span} - known.keys())
+            known.update(zip(wanted, pool.map(lambda k: outlines(heights[k]), wanted), strict=True))
+            wider = []
+            for a, b in spans:
+                if known[a] == known[b]:
+                    known.update(dict.fromkeys(range(a, b + 1), known[a]))
+                elif b - a > 1:
+                    middle = (a + b) // 2
+                    wider += [(a, middle), (middle, b)]
+            spans = wider
+    out = [known[0]]
+    for k in range(1, count):
+        out.append(out[-1] if known[k] is out[-1] or known[k] == out[-1] else known[k])
+    return out
