@@ -16,6 +16,7 @@ from chipload.geometry.step_faces import Face, Model
 from chipload.geometry.step_patch import patch_of
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
+from chipload.jobs.drafts.workpiece_material import elastic_entries
 from chipload.number_text import number_text
 from chipload.units import MM_PER
 
@@ -140,8 +141,7 @@ def _draft(title: str, shape: list[Entry], size: float, height: float, machine: 
     own = Entry(key, machine) if machine is not None else Entry("name", "xyzbc-head-table", "five axes", True)
     workpiece = (
         Entry("name", "Al 7075-T6", "the file names no material", True),
-        Entry("modulus_gpa", 71.7, "of this alloy", True),
-        Entry("poisson", 0.33, "of this alloy", True),
+        *elastic_entries("of this alloy"),
         Entry("density_kg_m3", 2810.0, "of this alloy", True),
         Entry("yield_mpa", 503.0, "of this alloy", True),
     )

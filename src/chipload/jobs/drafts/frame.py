@@ -25,6 +25,7 @@ from chipload.jobs.drafts.drawing import DIAMETERS, cutter_for, machine_of, plan
 from chipload.jobs.drafts.folder import RESULTS
 from chipload.jobs.drafts.found import CHORD, list_pockets
 from chipload.jobs.drafts.part_picture import part_picture
+from chipload.jobs.drafts.workpiece_material import elastic_entries
 from chipload.lazy import trimesh
 from chipload.machine.machine import Machine
 from chipload.number_text import number_text
@@ -256,8 +257,7 @@ def _check(
             DraftTable(
                 "workpiece",
                 (
-                    Entry("modulus_gpa", 71.7, "aluminium 7075", True),
-                    Entry("poisson", 0.33, "", False),
+                    *elastic_entries(),
                     Entry("yield_mpa", 430.0, "7075-T6 plate", True),
                     Entry("cell_mm", round(CELL * thinnest, 3), f"{CELL:g} times the thinnest wall or floor", True),
                     Entry("states", 8),
@@ -306,7 +306,7 @@ def _distortion(found: FoundPart, folder: Path) -> Draft:
             stress,
             DraftTable("part", (Entry("file", relative(found.file, folder)),)),
             plate,
-            DraftTable("workpiece", (Entry("modulus_gpa", 71.7, "aluminium 7075", True), Entry("poisson", 0.33))),
+            DraftTable("workpiece", elastic_entries()),
             DraftTable("setup", (side,), True),
             DraftTable(
                 "choices",
