@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chipload.errors import Severity
-from chipload.program.commands import ARC, YZ, ZX
+from chipload.program.commands import ARC, LINE, YZ, ZX
 from chipload.program.heidenhain.reader import read_heidenhain
 
 
@@ -49,3 +49,30 @@ def test_a_line_with_the_normal_of_its_surface_ends_where_it_says():
     assert commands.position[:, :3].tolist() == [[1, 2, 3], [4, 5, 6], [7, 5, 6]]
     _, findings = read("L X+1 Y+2 Z+3 F500", "LN X+4 NX+0 NY+0 NZ+1 TX+0 TY+0 TZ+1", lenient=True)
     assert [f.line for f in findings if f.severity > Severity.NOTE] == [5]
+
+
+def test_trans_datum_is_cycle_7():
+    """A shift by TRANS DATUM AXIS, in place of the one before it, and back by RESET."""
+    head = "BEGIN PGM A MM\nTOOL CALL 1 Z S1000\nM3\nL X+0 Y+0 Z+10 R0 FMAX\n"
+    shifted = "TRANS DATUM AXIS X+10 Y+5\nL X+1 Y+1 F100\nTRANS DATUM AXIS X+20\nL X+1\nTRANS DATUM RESET\nL X+1 Y+1\n"
+    commands, findings = read_heidenhain(f"{head}{shifted}M30\nEND PGM A MM\n")
+    assert not [f for f in findings if f.severity > f.severity.NOTE]
+    machine = [
+        (commands.position[k, :2] + commands.frames[commands.frame[k]].shift[:2]).tolist()
+        for k in range(len(commands.motion))
+    ]
+    assert machine[-3:] == [[11, 6], [21, 6], [1, 1]]
+
+
+def test_single_lip_drilling():
+    """At 750 to 2 mm above the start of 5 mm, at 150 in plunges of 8, 7 and the rest, out at 1000."""
+    head = "BEGIN PGM A MM\nTOOL CALL 1 Z S1000\nM3\nL X+0 Y+0 Z+10 R0 FMAX\n"
+    cycle = (
+        "CYCL DEF 241 SINGLE-LIP D.H.DRLNG Q200=2 Q201=-24 Q206=150 Q211=0 Q203=+0 Q204=10 Q379=5 Q253=750 Q208=1000 "
+        "Q426=3 Q427=500 Q202=8 Q212=1 Q205=3\nCYCL CALL\n"
+    )
+    commands, findings = read_heidenhain(f"{head}{cycle}M30\nEND PGM A MM\n")
+    assert not [f for f in findings if f.severity > f.severity.NOTE]
+    cuts = commands.motion == LINE
+    assert commands.position[cuts, 2].tolist() == [-3, -13, -20, -24, 2]
+    assert (commands.feed[cuts] * 60).tolist() == pytest.approx([750, 150, 150, 150, 1000])

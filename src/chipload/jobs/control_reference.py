@@ -13,10 +13,11 @@ from chipload.program.gcode.sinumerik import NO_MEANING, PLAIN, SAME, SYNCHRONIS
 from chipload.program.gcode.sinumerik_cycles import CYCLES as NAMED_CYCLES
 from chipload.program.gcode.sinumerik_flow import CLOSES
 from chipload.program.gcode.sinumerik_patterns import PATTERNS
+from chipload.program.gcode.sinumerik_pockets import POCKETS
 from chipload.program.gcode.sinumerik_points import POINT_WORDS, POLES
 from chipload.program.gcode.sinumerik_words import CORNERS, CURVES, IDLE, PLACED
 from chipload.program.gcode.sinumerik_words import UNREAD as UNREAD_WORDS
-from chipload.program.heidenhain import bore_cycles, cycles, q_cycles, switches
+from chipload.program.heidenhain import cycles, q_cycles, switches
 
 HEAD = """# {title}
 
@@ -99,6 +100,7 @@ def _rules(control: Control) -> list[tuple[str, str]]:
             ("after G80", "G0 to G3 as before the cycle" if modal.cycle_group else "no motion is active"),
             ("cycles return to", "where they began (G98)" if modal.old_level_at_start else "R (G99)"),
             ("repeats of a cycle", cycles_of.repeat_letter.upper()),
+            ("R, Z, Q and P of a cycle", "last for other cycles" if cycles_of.keeps_data else "of one cycle alone"),
             ("R and Z of a cycle where G90 and G91 change", "keep places" if cycles_of.keeps_places else "keep values"),
             ("G74, G84, G89 go out at their feed", f"to {'R, then at rapid' if cycles_of.feeds_to_r else 'the level'}"),
             ("P of a cycle with a dwell", "may be missing" if cycles_of.dwell_optional else "must be there"),
@@ -179,8 +181,9 @@ def _blocks(control: Control, family: bool = False) -> list[str]:
         names = {
             "idle": "without effect", "unread": "not read", "change": "change of the tool and approach",
             "tap": "G84 by the pitch I or J", "tap left": "G74 by the pitch I or J", "offset": "work offset by H",
-            "level": "level to which cycles with M53 go back",
+            "level": "level to which cycles with M53 go back", "home": "retraction to a position of the machine",
         }  # fmt: skip
+        names |= {f"offset {number}": f"G154 P{number - 9}" for number in range(10, 110)}
         taken = [(code_text(code), names.get(to) or code_text(int(to))) for code, to in sorted(changed.items())]
         out += ["", "## Codes with another meaning", "", *_table(("code", "taken as"), taken)]
     if family:
@@ -205,6 +208,8 @@ def _sinumerik(control: Control) -> list[str]:
         ("coordinates", " ".join((*PLACED, "MIRROR", "AMIRROR", "SCALE", "ASCALE", "TRAORI", "TRAFOOF"))),
         ("points and arcs", f"{_codes(10 * g for g in POLES)} {' '.join(sorted(POINT_WORDS))} CR TURN CIP CT"),
         ("patterns of holes", " ".join(PATTERNS)),
+        ("pockets, on rings of their own", " ".join(POCKETS)),
+        ("values", "R[ ], fields, DIV MOD TRUNC ROUND POT ATAN2 MINVAL MAXVAL BOUND, TRUE FALSE, DEFINE AS"),
         ("subprograms", "L100 P3, NAME P2, NAME(1, 2), CALL, EXTCALL: %_N_NAME_SPF or PROC in the text, NAME.SPF"),
         ("corners", " ".join(CORNERS)),
         (
@@ -224,7 +229,7 @@ def _sinumerik(control: Control) -> list[str]:
 
 
 def _heidenhain(control: Control) -> list[str]:
-    own = {1, 7, 9, 19, 247, 220, 221, *cycles.CHANGES, *q_cycles.CYCLES, *bore_cycles.CYCLES}
+    own = {1, 7, 9, 19, 247, 220, 221, *cycles.CHANGES, *q_cycles.CYCLES, *cycles.MILLING}
     rows = [
         ("motions", "L LN LP C CR CT CP CC RND CHF, RL RR R0"),
         ("approach and departure", "APPR and DEP with LT, LN, CT, LCT"),

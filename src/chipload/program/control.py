@@ -100,6 +100,7 @@ class CycleRules:
     starts_spindle : ``none``, ``tapping``, or ``all``: cycles that start a spindle at rest
     peck_letters : I, J and K of G73 and G83 are pecks that become shorter
     feeds_to_r : G74, G84 and G89 go at their feed up to R, then at rapid to the level of G98; else at feed to there
+    keeps_data : another cycle takes R, the bottom, Q and P of the one before it; else it states them
     keeps_places : a cycle keeps the places of R and its bottom where G90 and G91 change; else their values
     """
 
@@ -109,6 +110,7 @@ class CycleRules:
     starts_spindle: str
     peck_letters: bool
     feeds_to_r: bool
+    keeps_data: bool
     keeps_places: bool
 
 
@@ -123,6 +125,7 @@ class MacroRules:
     highest_variable : greatest number of a variable
     arguments : variable of each word of G65
     tool_variables : first variable of a row by number, and the kind of tool offset that it holds
+    probing : program of a probe by its number: ``move``, ``measure`` or ``switch``
     """
 
     system_variables: str
@@ -130,6 +133,7 @@ class MacroRules:
     highest_variable: int
     arguments: Mapping[str, int]
     tool_variables: Mapping[int, str]
+    probing: Mapping[int, str]
 
 
 @dataclass(frozen=True)
@@ -198,6 +202,7 @@ class TextRules:
     user_tasks : statements are those of an Okuma: VC1, CALL O, RTS, IF [ ] N
     unread : codes that are known and not read: what they do
     codes : codes that mean something else: the code that they are read as, ``idle`` or ``unread``
+    no_corners : codes whose block has words behind a comma that make no corner
     """
 
     refuses_unknown: bool
@@ -207,6 +212,7 @@ class TextRules:
     user_tasks: bool
     unread: Mapping[int, str]
     codes: Mapping[int, str]
+    no_corners: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -318,7 +324,7 @@ _RECORDS: dict[str, Any] = {
     "lines": LineRules,
     "evidence": Evidence,
 }
-_OPTIONAL: dict[str, Any] = {"arguments": {}, "tool_variables": {}}
+_OPTIONAL: dict[str, Any] = {"arguments": {}, "tool_variables": {}, "probing": {}}
 
 
 @cache

@@ -64,7 +64,7 @@ def test_a_loop_over_holes_is_the_same_as_holes_written_out():
         (("WHILE ACTUAL>3", "G1 X1", "ENDWHILE", "G1 X2"), [2], 2, "ACTUAL"),
         (("REPEAT", "G1 X1", "UNTIL ACTUAL>3", "G1 X2"), [1, 2], 4, "ACTUAL"),
         (("GOTOF NOWHERE", "G1 X1"), [1], 2, "GOTOF NOWHERE: there is no such label"),
-        (("CASE R1 OF 1 GOTOF A DEFAULT GOTOF B", "G1 X1", "A:", "B:"), [1], 2, "CASE: is not read"),
+        (("CASE R1 GOTOF A", "G1 X1", "A:", "B:"), [1], 2, "CASE is followed by a value and OF"),
         (("R1=1", "IF R1>0 AND R1<2", "G1 X1", "ENDIF", "X2"), [2], 3, "need brackets"),
         (("G1 X1", "GOTOS"), [1], 3, "starts the program again"),
         (("G1 X1 GOTOF E", "E: X2"), [2], 2, "GOTOF: is not read here"),

@@ -123,6 +123,10 @@ class Controller:
         self.feed_of_cuts: tuple[float, float] | None = None
         #: Sinumerik: the drilling cycle behind each block (MCALL), its name and its arguments
         self.modal_hole: tuple[str, list[float | None]] | None = None
+        #: Sinumerik: the subprogram behind each block (MCALL): name, repeats, arguments, and the level of calls
+        self.modal_program: tuple[str, int, list[float | None], int] | None = None
+        #: Sinumerik: texts by the names that stand for them (DEFINE)
+        self.named_texts: dict[str, str] = {}
         #: Sinumerik: the pole, the last polar point, and whether CIP lasts
         self.points = PointMemory()
         #: Sinumerik: whether the spindle of the tapping block that is read turns against K; None: no such block
@@ -134,8 +138,11 @@ class Controller:
         self.program_frame: ProgramFrame | None = None
         #: where a retraction to where only the machine knows was left out
         self.retracted: Nine | None = None
-        #: by what each peck of a hole is shorter than the one before it, and the least [units of the text]
-        self.pecks = 0.0, 0.0
+        #: by what each peck of a hole is shorter than the one before it, the least, and the depth after which G73 lifts
+        #: the drill to R, 0: it does not [units of the text]
+        self.pecks = 0.0, 0.0, 0.0
+        #: depth of a peck of tapping [units of the text]; 0: in one go
+        self.tap_peck = 0.0
         #: rounds every corner (RNDM of a Sinumerik)
         self.rounding: Corner | None = None
         self._held: tuple[Piece, int, Corner, bool] | None = None

@@ -39,6 +39,7 @@ class Hole:
     """Numbers of one hole [units of the text, s]; ``sense`` of the spindle: 1, -1 or 0.
 
     ``shorter``: each peck is by that shorter than the one before it, and at least ``least`` where it is.
+    ``lift``: after that depth G73 goes to R; 0: it does not.
     ``out``: height up to which G74, G84 and G89 go at their feed, then at rapid to ``clear``; None: at feed to there.
     ``shift`` [mm] and ``middle`` of G87; ``back`` is RETURN in units of the text.
     """
@@ -54,6 +55,7 @@ class Hole:
     back: float = RETURN
     shorter: float = 0.0
     least: float = 0.0
+    lift: float = 0.0
     out: float | None = None
 
 
@@ -69,6 +71,7 @@ def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
     else:
         if code in (740, 840):
             _require_spindle_sense(code, hole.sense)
+            yield from _tap_pecks(a, b, hole)
         elif code in (860, 880) and hole.sense == 0:
             raise InputError(f"G{code // 10}: the spindle does not turn: start it by M3 or M4")
         yield LINE, a, b, bottom, 0.0
@@ -98,6 +101,21 @@ def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         yield SPIN, a, b, clear, hole.sense
 
 
+def _tap_pecks(a: float, b: float, hole: Hole) -> Iterator[Step]:
+    """Pecks of a tap before the last one: in, back a little, in again."""
+    if hole.peck <= 0.0:
+        return
+    if (hole.r - hole.bottom) / hole.peck > MOST_PECKS:
+        raise InputError(f"Q{hole.peck:g}: makes more than {MOST_PECKS} pecks: raise it")
+    depth = hole.r - hole.peck
+    while depth > hole.bottom + 1e-9:
+        yield LINE, a, b, depth, 0.0
+        yield SPIN, a, b, depth, -hole.sense
+        yield LINE, a, b, depth + hole.back, 0.0
+        yield SPIN, a, b, depth, hole.sense
+        depth -= hole.peck
+
+
 def _require_spindle_sense(code: int, sense: int) -> None:
     right = 1 if code == 840 else -1
     if sense != right:
@@ -117,11 +135,12 @@ def _pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         )
     if hole.shorter > 0.0 and (hole.r - hole.bottom) / hole.least > MOST_PECKS:
         raise InputError(f"K{hole.least:g}: makes more than {MOST_PECKS} pecks: raise it")
-    peck = hole.peck
+    peck, lift_level = hole.peck, hole.r
     depth = hole.r - peck
     while depth > hole.bottom:
         yield LINE, a, b, depth, 0.0
-        if code == 830:
+        if code == 830 or 0.0 < hole.lift <= lift_level - depth + 1e-9:
+            lift_level = depth
             yield RAPID, a, b, hole.r, 0.0
         yield RAPID, a, b, depth + hole.back, 0.0
         peck = max(peck - hole.shorter, hole.least) if hole.shorter > 0.0 else peck

@@ -74,6 +74,11 @@ class Drilling:
             self.started = tapping
             self.c.once("nc-cycle-spindle", f"{code_text(code)}: the spindle is at rest: the cycle starts it")
             self.c.changed()
+        elif which == "all" and tapping and state.speed > 0.0 and state.sense != (-1 if code == 740 else 1):
+            # a tap turns as its cycle asks for, whatever the spindle did before
+            state.sense, self.started = -1 if code == 740 else 1, True
+            self.c.once("nc-cycle-spindle", f"{code_text(code)}: the cycle turns the spindle the other way")
+            self.c.changed()
 
     def move(self, block: Block, code: int) -> None:
         """Carry out the cycle ``code`` over the holes of a block."""
@@ -175,6 +180,12 @@ class Drilling:
         words = block.words
         if self.c.state.diameter and normal == "x":
             raise InputError(f"{code_text(code)}: no cycle along X with diameters (G7)")
+        shares_data = self.c.control.cycles.keeps_data and old is not None
+        shares_data = shares_data and cycles.FANUC_BACK_BORING not in (code, old.code if old is not None else code)
+        if old is not None and shares_data and old.code != code:
+            # Q and the letters of another cycle may mean something else there
+            peck = old.peck if code in cycles.NEED_Q and old.code in cycles.NEED_Q else None
+            old = replace(old, code=code, peck=peck, i=None, j=None, k=None)
         if old is None or old.code != code:
             if "r" not in words:
                 raise InputError(f"{code_text(code)}: R is missing: where feeding begins")
@@ -222,12 +233,12 @@ class Drilling:
             r,
             bottom,
             clear,
-            series.peck or 0.0,
+            self.c.tap_peck if code in cycles.TAPPING else series.peck or 0.0,
             dwell,
             self.c.state.sense,
             shift,
             middle,
             cycles.RETURN / scale,
-            *(self.c.pecks if code in cycles.NEED_Q else (0.0, 0.0)),
+            *(self.c.pecks if code in cycles.NEED_Q else (0.0, 0.0, 0.0)),
             out=r if self.c.control.cycles.feeds_to_r else None,
         )

@@ -33,11 +33,20 @@ from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.frames import remove, turn_about
 from chipload.program.gcode.haas_cycles import circular_pocket, hole_pattern
 from chipload.program.gcode.interpolation_codes import change_plane, refuse_within
-from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, read_macro_call, system_variables, with_brackets
+from chipload.program.gcode.macros import (
+    ALARM,
+    OUTPUTS,
+    clear_variable,
+    macro_step,
+    read_macro_call,
+    system_variables,
+    with_brackets,
+)
 from chipload.program.gcode.modal import GROUP_OF, code_text
 from chipload.program.gcode.numbers import count_increments, decide_increments, seconds_of
 from chipload.program.gcode.offsets import choose, probe_motion
 from chipload.program.gcode.other_codes import replace_codes, without_next_tool
+from chipload.program.gcode.state import LINEAR, ZERO
 from chipload.program.gcode.tilted_plane import align, at_angles, level, tilt_coordinates
 from chipload.program.gcode.words import Block, bare, read_block
 from chipload.program.tilt import tilt_of, turn_matrix
@@ -93,6 +102,8 @@ NO_POSITIONS = {220: "xyzijk", 51: "xyzabc"}
 LEFT_OUT = frozenset({61, 62})
 #: rigid tapping: LinuxCNC's code
 TAPPING = {842: 840, 843: 740}
+#: tapping itself, and pecks that break the chip: K of a Haas and J of an Okuma lift the drill out after a depth
+TAPS, PECKS_WITHOUT_LIFT = (840, 740), 730
 FINE_BORING, BORING = 760, 860
 #: end of what is not on, or what does not affect the path
 IDLE = frozenset(
@@ -135,6 +146,8 @@ class Fanuc(Dialect):
         call = read_macro_call(text, comments, c)
         if call is not None:
             return lenient(call, c, UNREAD | LEFT_OUT)
+        if clear_variable(text, c):
+            return None
         text = without_next_tool(text, c)
         block = read_block(with_brackets(_corners(text, c)), comments, c.parameters)
         rules = c.control.text
@@ -159,6 +172,8 @@ class Fanuc(Dialect):
         self._coordinates(block, c)
         change_plane(block, c)
         change_coordinates(block, c)
+        if 99 in block.m and "p" in block.words:
+            block.returns_to = integer_of(block.words.pop("p"), "M99 P")
         if 198 in block.m:
             raise NotReadError("M198: calls a program of another device")
         if 97 in block.m:
@@ -272,6 +287,8 @@ class Fanuc(Dialect):
             g[g.index(HAAS_TIP)] = 434
         if EXTENDED in g or (540 in g and "p" in words and 40 not in g):
             self._extended_offset(block, c)
+        if 100 in g:
+            self._add_to_origin(words, c, c.state.absolute and 910 not in g)
         if 100 in g and words.get("l") != 2.0:
             if words.get("l") == 20.0:
                 words.pop("l")
@@ -293,12 +310,13 @@ class Fanuc(Dialect):
         motion = next((x for x in g if x in CYCLES), c.state.motion)
         if motion in CYCLES:
             self._shorter_pecks(words, g, motion, c)
+            self._pecks_of_taps(words, g, motion, c)
             repeat = c.control.cycles.repeat_letter
             if repeat == "q" and motion in NEED_Q:
                 # an Okuma repeats by Q, but for the pecks of G83 and G73, whose depth may also be I
                 if "i" in words and "q" not in words:
                     words["q"] = words.pop("i")
-                    words.pop("j", None)
+                    c.pecks = 0.0, 0.0, words.pop("j", 0.0) if motion == PECKS_WITHOUT_LIFT else 0.0
             elif repeat in words and repeat != "l":
                 words["l"] = words.pop(repeat)
             if "p" in words and 40 not in g and 98 not in block.m:
@@ -315,9 +333,36 @@ class Fanuc(Dialect):
             if "q" in words:
                 raise NotReadError(f"{code_text(motion)}: I with Q: pecks that retract after a depth Q")
             words["q"] = words.pop("i")
-            c.pecks = words.pop("j", 0.0), words.pop("k", 0.0)
+            c.pecks = words.pop("j", 0.0), words.pop("k", 0.0), 0.0
         elif any(code in CYCLES for code in g) or "q" in words:
-            c.pecks = 0.0, 0.0
+            has_lift = c.control.cycles.repeat_letter == "l" and motion == PECKS_WITHOUT_LIFT
+            c.pecks = 0.0, 0.0, words.pop("k", 0.0) if has_lift else 0.0
+
+    @staticmethod
+    def _pecks_of_taps(words: dict[str, float], g: list[int], motion: int, c: Controller) -> None:
+        """Q of G84 and G74: tapping in pecks; J of a Haas: how much faster the tap comes out, which is left out."""
+        if motion not in TAPS:
+            return
+        if "q" in words and c.control.cycles.repeat_letter != "q":
+            c.tap_peck = words.pop("q")
+            c.once("nc-tap-pecks", "G84 Q: between its pecks the tap goes back by a setting: 0.254 mm are taken")
+        elif any(code in TAPS for code in g):
+            c.tap_peck = 0.0
+        if "j" in words:
+            del words["j"]
+            c.once("nc-tap-retraction", "G84 J: the tap is taken to come out as fast as it goes in")
+
+    @staticmethod
+    def _add_to_origin(words: dict[str, float], c: Controller, absolute: bool) -> None:
+        """G10 L2 and L20 in G91 move an origin by their words."""
+        base = {2.0: 0, 20.0: 9}.get(words.get("l", 0.0))
+        number = int(words.get("p", 0.0))
+        if absolute or base is None or number < 1 or (base == 0 and number > 9):
+            return
+        at = c.work_offset(base + number)[0] if base == 0 or base + number in c.origins else ZERO
+        for k, axis in enumerate("xyzabc"):
+            if axis in words:
+                words[axis] += at[k] / (c.state.scale if k in LINEAR else 1.0)
 
     @staticmethod
     def _tool_offset(words: dict[str, float], c: Controller) -> None:
@@ -391,8 +436,7 @@ def _corners(text: str, c: Controller) -> str:
     """
     if "," not in text or OUTPUTS.match(text):
         return text
-    if "g61.1" in text:
-        # a class of accuracy of a Mazak
+    if any(code_text(code).lower() in text for code in c.control.text.no_corners):
         return _CORNER.sub("", text)
     for found in _CORNER.finditer(text):
         size = read_value(found[2], 0, c.parameters)[0] * c.state.scale

@@ -210,6 +210,8 @@ class Flow:
             self._macro(block.macro)
         elif self.c.modal_macro is not None and self.c.modal_macro[1] == self.c.level and self._moves_axis(block):
             self._macro(self.c.modal_macro[0])
+        elif self.c.modal_program is not None and self.c.modal_program[3] == self.c.level and self._moves_axis(block):
+            self._program(*self.c.modal_program[:3])
         elif block.block_call:
             self._call_block(block.block_call)
         elif block.program_call is not None:
@@ -217,7 +219,7 @@ class Flow:
         elif 98 in block.m:
             self._call_number(block.words)
         elif 99 in block.m:
-            return self._return_number()
+            return self._return_number(block.returns_to)
         return True
 
     def _macro(self, call: MacroCall) -> None:
@@ -517,8 +519,11 @@ class Flow:
         if times > 0:
             self._enter(self.source, place - 1, f"N{number}", False, min(times, MOST_REPEATS))
 
-    def _return_number(self) -> bool:
-        """M99."""
+    def _return_number(self, number: int | None = None) -> bool:
+        """M99; with P it goes on at the block N of that number in the text that called."""
+        if not self._calls and number is not None and block_number(self.source, self.line, number) >= self.line:
+            self.line = block_number(self.source, self.line, number)
+            return True
         if not self._calls:
             self.c.note("nc-endless", "M99 in the main program starts it again without end: it is read once")
             self.i.finish()
@@ -534,4 +539,6 @@ class Flow:
             if call.macro:
                 self.c.parameters.leave()
             self._leave()
+            if number is not None:
+                self.line = block_number(self.source, self.line, number)
         return True

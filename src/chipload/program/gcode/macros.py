@@ -13,10 +13,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from chipload.errors import InputError
+from chipload.program.commands import RAPID
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.dialect import NotReadError
 from chipload.program.gcode.expression import integer_of, read_value
+from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.source import Source
+from chipload.program.gcode.state import put
 from chipload.program.gcode.words import Block, MacroCall, bare, strip_number
 
 if TYPE_CHECKING:
@@ -28,6 +31,7 @@ _TO = re.compile(r"goto(?P<value>[0-9]+|#|\[)")
 _NUMBER = re.compile(r"^[ \t]*(?:/[1-9]?[ \t]*)?[nN][ \t]*0*([0-9]+)", re.MULTILINE)
 _VACANT = re.compile(r"#([0-9]{1,5})(eq|ne)#0(?![0-9])")
 _ASSIGN = re.compile(rf"({_START}#(?:[0-9]+|\[[^\]=]*\]))=(.*)\Z", re.DOTALL)
+_CLEAR = re.compile(rf"{_START}#([0-9]{{1,5}})=#0\Z")
 #: a call of a macro, once (G65) or after each motion (G66)
 _CALL = re.compile(r"g(65|66)(?![0-9.])")
 #: words of a call that are no arguments, and those of an argument list that may be repeated
@@ -146,6 +150,14 @@ def with_brackets(text: str) -> str:
     return f"{found[1]}=[{found[2]}]" if found is not None and found[2] else text
 
 
+def clear_variable(text: str, c: Controller) -> bool:
+    """Carry out ``#100=#0``, after which the variable is vacant; whether the text is such a block."""
+    found = _CLEAR.fullmatch(text)
+    if found is not None:
+        c.parameters.numbered.pop(int(found[1]), None)
+    return found is not None
+
+
 def read_macro_call(text: str, comments: list[str], c: Controller) -> Block | None:
     """The block of a line with G65 or G66; None where it has neither.
 
@@ -192,6 +204,10 @@ def read_macro_call(text: str, comments: list[str], c: Controller) -> Block | No
 def call_macro(flow: Flow, call: MacroCall) -> None:
     """G65: a subroutine of this text with parameters of its own."""
     place = flow.main.numbers.get(call.label)
+    probing = flow.c.control.macros.probing.get(int(call.label), "") if place is None else ""
+    if probing:
+        probe(flow.c, call, probing)
+        return
     if place is None:
         raise NotReadError(f"G65 P{call.label}: there is no O{call.label} in this text")
     flow.enter_macro(place, call.label, call.times)
@@ -201,14 +217,37 @@ def call_macro(flow: Flow, call: MacroCall) -> None:
     numbered.update(call.values)
 
 
+def probe(c: Controller, call: MacroCall, kind: str) -> None:
+    """A program of a probe that the machine holds: it goes to X Y Z, measures, or is switched on and off."""
+    name = f"G65 P{call.label}"
+    if kind == "switch":
+        c.once("nc-probe", f"{name}: switches the probe: does not move the path")
+        return
+    if kind == "measure":
+        c.leave_out(
+            "nc-probe",
+            f"{name}: measures: its way is left out, and what it stores is not known: state the offsets that it sets "
+            "in program.work_offsets or program.parameters",
+        )
+        return
+    scale, at = c.state.scale, c.state.at
+    target_axes = {k: call.words[x] * scale for k, x in enumerate("xyz") if x in call.words}
+    if not c.state.absolute:
+        target_axes = {k: at[k] + value for k, value in target_axes.items()}
+    c.once("nc-probe", f"{name}: a guarded way of the probe: taken to its programmed end")
+    c.straight(RAPID, put(at, target_axes))
+
+
 def system_variables(c: Controller) -> dict[int | str, Callable[[], float]]:
     """Parameters that mirror the state: codes that hold, F, S, T, and where the tool is."""
     state = c.state
+    c.tool_rows.moved = lambda number: choose(c, f"work offset {number}", number)
 
     def place(k: int) -> Callable[[], float]:
         return lambda: state.at[k] / (state.scale if k < 3 else 1.0)
 
     out: dict[int | str, Callable[[], float]] = {
+        0: lambda: 0.0,
         4001: lambda: 0.0 if state.motion == 800 else state.motion / 10.0,
         4002: lambda: state.plane / 10.0,
         4003: lambda: 90.0 if state.absolute else 91.0,

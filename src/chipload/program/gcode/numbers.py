@@ -12,7 +12,7 @@ import re
 from typing import TYPE_CHECKING
 
 from chipload.errors import Severity
-from chipload.program.gcode.cycles import CYCLES, NEED_Q
+from chipload.program.gcode.cycles import CYCLES, NEED_Q, TAPPING
 
 if TYPE_CHECKING:
     from chipload.program.gcode.controller import Controller
@@ -83,6 +83,8 @@ def _counts(letter: str, block: Block, c: Controller, cycle: bool) -> bool:
     """Whether a word of the block is a count, or an angle in whole degrees."""
     if letter == "q":
         return not (cycle and not NEED_Q.isdisjoint({c.state.motion, *block.g, 760, 870}))
+    if letter == "j" and not TAPPING.isdisjoint({c.state.motion, *block.g}):
+        return True
     if letter == "k" and cycle:
         return c.control.cycles.repeat_letter == "k"
     if letter in "ijk" and not _ANGLES.isdisjoint(block.g):

@@ -8,6 +8,8 @@ Notation: codes of G are in tenths. The profile maps a code to the one that it i
 | ``change`` | G100 of a Brother: changes the tool, then goes at rapid over X, Y and the rotary axes, then along Z |
 | ``tap``, ``tap left`` | G77, G78 of a Brother: tapping by a pitch I [units of the text] or J threads an inch |
 | ``offset`` | G15 H of an Okuma: a work offset by its number |
+| ``offset 10`` | G110 of a Haas: the work offset of that number |
+| ``home`` | G30 P of an Okuma: a retraction to a home position of the machine |
 | ``level`` | G71 Z of an Okuma: the level to which a cycle with M53 goes back; with M54 it goes back to R |
 
 References: posts for Brother and Okuma OSP; Okuma OSP7000M, 700M, code tables.
@@ -69,6 +71,12 @@ def replace_codes(block: Block, codes: Mapping[int, str], c: Controller) -> None
             _tap(block, code, TAPS[meaning], c)
         elif meaning == "offset":
             _work_offset(block, code, c)
+        elif meaning.startswith("offset "):
+            choose(c, code_text(code), int(meaning.removeprefix("offset ")))
+        elif meaning == "home":
+            block.words.pop("p", None)
+            c.retracted = c.state.at
+            c.note("nc-machine-retraction", f"{code_text(code)}: a retraction to a position of the machine is left out")
         elif meaning == "level":
             if "z" not in block.words:
                 raise NotReadError(f"{code_text(code)}: Z is missing: the level")

@@ -119,6 +119,7 @@ def _ready(c: Controller, motion: ControllerMotion) -> bool:
         and c.scaled is None
         and c.modal_macro is None
         and c.modal_hole is None
+        and c.modal_program is None
         and not c.points.tangent
         and state.motion in (0, 10, 20, 30, 800)
         and len(c.placed) == 3

@@ -29,21 +29,22 @@ from chipload.program.corners import Corner
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.coordinates import factor_axes, words_of_arcs
 from chipload.program.gcode.dialect import NOTED, Dialect, NotReadError, go_on, leave_out, lenient
-from chipload.program.gcode.expression import integer_of, read_value
+from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.frames import further, remove
 from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.sinumerik_cycles import CYCLES, NORMAL, hole_blocks
 from chipload.program.gcode.sinumerik_flow import flow_step
 from chipload.program.gcode.sinumerik_patterns import PATTERNS, hole_positions
+from chipload.program.gcode.sinumerik_pockets import POCKETS, mill_pocket
 from chipload.program.gcode.sinumerik_points import PLANES, POINT_WORDS, POLES, place_points
 from chipload.program.gcode.sinumerik_swivel import swivel
+from chipload.program.gcode.sinumerik_values import define, element, value_of, without_blanks
 from chipload.program.gcode.sinumerik_words import (
     ALONG_TOOL,
     CORNERS,
     CURVES,
     END_ALONG_TOOL,
     FRAMES,
-    FUNCTIONS,
     IDLE,
     JUMPS,
     PLACED,
@@ -69,17 +70,20 @@ _TOKEN = re.compile(
     re.VERBOSE,
 )
 _DIMENSION = re.compile(r"(AC|IC|DC|ACP|ACN)\((.*)\)\Z", re.DOTALL)
-_R = re.compile(r"R([0-9]+)(?![0-9A-Z_])")
 _LABEL = re.compile(r"^(N[0-9]+\s*)?[A-Z_][A-Z0-9_]*\s*:(?!=)\s*")
-_NAMED = re.compile(r"[A-Z_$][A-Z0-9_$]*")
 _CALL = re.compile(r'(?:N[0-9]+\s*)?(?:EXT)?CALL\s*\(?\s*"([^"]+)"\s*\)?\s*\Z')
 _CYCLE = re.compile(r"(?:CYCLE|POCKET|SLOT|HOLES)[0-9]|LONGHOLE\Z")
+#: reference and fixed points of the machine, and a text that a name stands for
+_RETURNS = re.compile(r"(?:N[0-9]+\s*)?G7[45](?![0-9])")
+_TEXT = re.compile(r"DEFINE\s+([A-Z_][A-Z0-9_]*)\s+AS\s+(.*)", re.DOTALL)
 _DEFINITION = re.compile(r"DEF\s+(?:CHAN\s+|NCK\s+)?(REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b(.*)")
 #: codes of G as LinuxCNC has them, in tenths
 SAME = {60: 610, 64: 640, 641: 640, 642: 640, 643: 640, 644: 640, 645: 640, 70: 200, 700: 200, 71: 210, 710: 210,
         153: 530, 53: 530, 9: 0}  # fmt: skip
 PLAIN = frozenset({0, 1, 2, 3, 4, 17, 18, 19, 40, 41, 42, 54, 55, 56, 57, 90, 91, 93, 94, 95, 96, 97})
 NO_MEANING = frozenset({9, 25, 26, 450, 451, 460, 461, 462, 601, 602, 603, 621, 810, 820, 930, 931, 94})
+#: shifts by G code
+FRAME_CODES = {58: "TRANS", 59: "ATRANS"}
 #: G33 and tapping: LinuxCNC's code, and whether the spindle turns against K
 SYNCHRONISED = {33: None, 331: False, 332: True}
 _WORDS = frozenset("XYZABCUVWIJKFSTDH")
@@ -94,20 +98,32 @@ class Sinumerik(Dialect):
 
     def jump(self, flow: Flow, raw: str) -> bool:
         """Jumps and loops."""
-        return flow_step(flow, raw, _value)
+        return flow_step(flow, raw, value_of)
 
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line, in LinuxCNC's words."""
         body, _, comment = _without_comment(raw)
         body = body.strip().upper()
         block = Block(comments=[comment] if comment else [])
-        if body.startswith(("%", "PROC ")) or (body.startswith("$") and "=" not in body):
+        if body.startswith(("%", "PROC ", "EXTERN ")) or (body.startswith("$") and "=" not in body):
             return None
         body = _LABEL.sub(r"\1", re.sub(r"^/[0-9]?\s*", "", body))
         definition = _DEFINITION.match(body)
         if definition:
-            _define(definition[1], definition[2], c)
+            if definition[1] in ("REAL", "INT", "BOOL"):
+                define(definition[2], c)
             return None
+        if _RETURNS.match(body):
+            c.retracted = c.state.at
+            c.note("nc-machine-retraction", f"{body[:24]}: a retraction to a position of the machine is left out")
+            return None
+        named_text = _TEXT.match(body)
+        if named_text:
+            c.named_texts[named_text[1]] = named_text[2].strip()
+            return None
+        for name, meaning in c.named_texts.items():
+            body = re.sub(rf"(?<![A-Z0-9_]){name}(?![A-Z0-9_(=])", lambda _, text=meaning: text, body)
+        body = without_blanks(body)
         call = _CALL.match(body)
         if call:
             block.program_call = call[1].rsplit("/", 1)[-1].split(".")[0].removesuffix("_SPF"), 1
@@ -128,7 +144,11 @@ class Sinumerik(Dialect):
             elif found["name"] in ("SPOS", "SPOSA"):
                 _position_spindle(block, c, found["index"])
             elif found["name"]:
-                _set_named(block, c, found["name"], found["value"], values)
+                if found["index"] is not None and _is_field(found["name"], c):
+                    key = element(found["name"], found["index"], c)
+                    block.sets.append((key, value_of(found["value"], c)))
+                else:
+                    _set_named(block, c, found["name"], found["value"], values)
             elif found["call"]:
                 _call_named(block, c, found["call"], found["arguments"])
             elif not found["colon"]:
@@ -147,10 +167,17 @@ class Sinumerik(Dialect):
     def _holes(self, block: Block, c: Controller) -> None:
         """A drilling cycle at the position of the tool or, with MCALL, after each block that moves in the plane."""
         moves = {"x", "y", "z"} - {NORMAL.get(c.state.plane, "z")}
-        if block.pattern is not None:
+        if block.pocket is not None:
+            if block.modal or not moves.isdisjoint(block.words) or c.left_out:
+                raise NotReadError(f"{block.pocket[0]}: beside MCALL or a motion")
+            mill_pocket(*block.pocket, c)
+        elif block.pattern is not None:
             block.after = _pattern_blocks(*block.pattern, c)
         elif block.modal:
-            c.modal_hole = block.hole
+            c.modal_hole, c.modal_program = block.hole, None
+            if block.program_call is not None:
+                c.modal_program = *block.program_call, block.arguments, c.level
+                block.program_call = None
         elif (block.hole or c.modal_hole) and c.scaled is not None and c.scaled[0][2] != 1.0:
             raise NotReadError("a cycle in coordinates that are scaled or mirrored along Z")
         elif block.hole is not None:
@@ -208,21 +235,9 @@ def _without_comment(raw: str) -> tuple[str, str, str]:
     return raw, "", ""
 
 
-def _value(text: str, c: Controller) -> float:
-    """Value of an expression with R parameters and ( )."""
-    plain = _R.sub(r"#\1", "".join(text.split()))
-    if _NAMED.sub("", plain) != plain:
-        for name in _NAMED.findall(plain):
-            if name in FUNCTIONS:
-                continue
-            if f"_{name.lower()}" not in c.parameters.shared:
-                raise NotReadError(f"{name}: its value is not known")
-            plain = re.sub(rf"(?<![A-Z0-9_]){re.escape(name)}(?![A-Z0-9_])", f"#<_{name.lower()}>", plain)
-    plain = plain.replace("(", "[").replace(")", "]").lower()
-    value, end = read_value(f"[{plain}]", 0, c.parameters)
-    if end != len(plain) + 2:
-        raise InputError(f"{text!r}: cannot be read as a value")
-    return value
+def _is_field(name: str, c: Controller) -> bool:
+    """Whether a name with [ ] is R or a field of the program."""
+    return name == "R" or any(x.startswith(f"_{name.lower()}[") for x in c.parameters.shared)
 
 
 def _letter(block: Block, c: Controller, letter: str, value: float, values: list[tuple[str, str, float]]) -> None:
@@ -268,6 +283,8 @@ def _code(block: Block, c: Controller, code: int) -> None:
             c.reversed = SYNCHRONISED[code]
     elif code == 63:
         block.g.append(10)
+    elif code == 59 or (code == 58 and c.program_frame is None):
+        block.frame = FRAME_CODES[code]
     elif code in POLES:
         block.pole = code
     elif code in (34, 35, 58, 59, 74, 75, *range(140, 149), 247, 248, 347, 348):
@@ -325,10 +342,10 @@ def _set_named(block: Block, c: Controller, name: str, text: str, values: list[t
     if name in POINT_WORDS:
         dimension = _DIMENSION.match(text)
         how = dimension[1] if dimension is not None else "AC"
-        block.point[name] = how, _value(dimension[2] if dimension is not None else text, c)
+        block.point[name] = how, value_of(dimension[2] if dimension is not None else text, c)
         return
     if name == "P" and block.program_call is not None:
-        block.program_call = block.program_call[0], integer_of(_value(text, c), "P")
+        block.program_call = block.program_call[0], integer_of(value_of(text, c), "P")
         return
     if name in CURVES:
         _left_out(block, c, name)
@@ -345,34 +362,37 @@ def _set_named(block: Block, c: Controller, name: str, text: str, values: list[t
         c.once("nc-ignored", f"{name}: does not affect the path; it is ignored")
         return
     if re.fullmatch(r"R[0-9]{1,4}", name):
-        block.sets.append((int(name[1:]), _value(text, c)))
+        block.sets.append((int(name[1:]), value_of(text, c)))
         return
     if name == "CR":
-        _put(block, "r", _value(text, c))
+        _put(block, "r", value_of(text, c))
     elif name == "TURN":
-        _put(block, "p", _value(text, c) + 1.0)
+        _put(block, "p", value_of(text, c) + 1.0)
     elif name in ("G", "M"):
-        _letter(block, c, name, _value(text, c), values)
+        _letter(block, c, name, value_of(text, c), values)
     elif f"_{name.lower()}" in c.parameters.shared:
-        block.sets.append((f"_{name.lower()}", _value(text, c)))
+        block.sets.append((f"_{name.lower()}", value_of(text, c)))
     elif name == "RPL":
-        _put(block, "p", _value(text, c))
+        _put(block, "p", value_of(text, c))
     elif len(name) == 1 and name in _WORDS:
         dimension = _DIMENSION.match(text)
-        value = _value(dimension[2] if dimension is not None else text, c)
+        value = value_of(dimension[2] if dimension is not None else text, c)
         if dimension is not None and name in "XYZABCUVWIJK":
             values.append((name.lower(), dimension[1], value))
         else:
             _put(block, name.lower(), value)
-    elif re.fullmatch(r"[SM][0-9]", name):
-        c.note("nc-unknown-word", f"{name}={text}: further spindles are left out")
+    elif name in ("S1", "M1", "T1"):
+        # spindle 1 is the one that cuts
+        _letter(block, c, name[0], value_of(text, c), values)
+    elif re.fullmatch(r"[SMTH][0-9]", name):
+        c.note("nc-unknown-word", f"{name}={text}: further spindles and auxiliary functions are left out")
     else:
         c.note("nc-unknown-word", f"{name}={text[:40]}: is not known")
 
 
 def _corner(c: Controller, name: str, text: str) -> None:
     """A rounding or chamfer after the motion of the block; RNDM: after every motion until RNDM=0."""
-    size, label = _value(text, c) * c.state.scale, f"{name}={text.strip()[:20]}"
+    size, label = value_of(text, c) * c.state.scale, f"{name}={text.strip()[:20]}"
     if not 0.0 <= size <= LARGEST_CORNER:
         raise InputError(f"{label}: must be from 0 to {LARGEST_CORNER:g} mm")
     corner = Corner(name.startswith("RND"), size, None, label, edge=name == "CHF") if size > 0.0 else None
@@ -395,13 +415,15 @@ def _call_named(block: Block, c: Controller, name: str, arguments: str) -> None:
     elif name == "TRAORI":
         _keyword(block, c, name)
     elif name == "CYCLE800":
-        swivel(c, [_value(x, c) if x.strip() else 0.0 for x in re.sub(r'"[^"]*"', "", arguments).split(",")])
+        swivel(c, [value_of(x, c) if x.strip() else 0.0 for x in re.sub(r'"[^"]*"', "", arguments).split(",")])
     elif name in FRAMES:
         leave_out(c, f"{name}: changed coordinates")
     elif name in CYCLES:
-        block.hole = (name, [_value(x, c) if x.strip() else None for x in arguments.split(",")])
+        block.hole = (name, [value_of(x, c) if x.strip() else None for x in arguments.split(",")])
+    elif name in POCKETS:
+        block.pocket = name, [value_of(x, c) if x.strip() else None for x in arguments.split(",")]
     elif name in PATTERNS:
-        block.pattern = name, [_value(x, c) if x.strip() else None for x in arguments.split(",")]
+        block.pattern = name, [value_of(x, c) if x.strip() else None for x in arguments.split(",")]
     elif name in JUMPS:
         _keyword(block, c, name)
     elif name in IDLE:
@@ -410,17 +432,7 @@ def _call_named(block: Block, c: Controller, name: str, arguments: str) -> None:
         c.leave_out("nc-call", f"{name}({arguments.strip()[:60]}): cycles and calls are not read: left out")
     else:
         block.program_call = name, 1
-        block.arguments = [_value(x, c) if x.strip() else None for x in arguments.split(",")]
-
-
-def _define(kind: str, names: str, c: Controller) -> None:
-    """DEF REAL and INT: names with their values, 0 without one."""
-    for part in names.split(",") if kind in ("REAL", "INT", "BOOL") else []:
-        name, _, value = part.partition("=")
-        if not re.fullmatch(r"\s*[A-Z_][A-Z0-9_]*\s*", name):
-            c.once("nc-ignored", f"DEF: {part.strip()[:40]}: is not read")
-            continue
-        c.parameters.assign(f"_{name.strip().lower()}", _value(value, c) if value.strip() else 0.0)
+        block.arguments = [value_of(x, c) if x.strip() else None for x in arguments.split(",")]
 
 
 def _frame(block: Block, c: Controller) -> None:

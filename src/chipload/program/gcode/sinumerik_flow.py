@@ -1,4 +1,4 @@
-"""Jumps and loops of a Sinumerik: GOTO, IF, ELSE, WHILE, FOR, LOOP, REPEAT and REPEATB.
+"""Jumps and loops of a Sinumerik: GOTO, IF, ELSE, WHILE, FOR, LOOP, REPEAT, REPEATB and CASE.
 
 Notation: lines count from 0. A jump leads to a label (``NAME:`` at the beginning of a block) or a block number: GOTOF
 forward, GOTOB backward, GOTO and GOTOC forward and, where there is none, from the start of the text. IF, WHILE, FOR,
@@ -38,6 +38,7 @@ _WORD = re.compile(
     re.DOTALL,
 )
 _GOTO = re.compile(r"\bGOTO([FBCS]?)\s*([A-Z_][A-Z0-9_]*|N?[0-9]+)?\s*\Z")
+_BRANCH = re.compile(r"([^\s]+)\s+GOTO([FBC]?)\s+([A-Z_][A-Z0-9_]*|N?[0-9]+)")
 _FOR = re.compile(r"([A-Z_][A-Z0-9_]*)\s*=\s*(.+?)\s+TO\s+(.+)\Z")
 _TIMES = re.compile(r"\bP\s*=?\s*(.+)\Z")
 _SIGNS = re.compile(r"==|<>|>=|<=|>|<")
@@ -198,7 +199,7 @@ def _next(flow: Flow, some: Statements, one: Statement, value: Value) -> int:
         case "REPEAT" | "REPEATB" if rest:
             return _repeat(flow, some, one, value)
         case "CASE":
-            raise NotReadError("CASE: is not read")
+            return _case(flow, some, rest, value)
         case word if word.startswith("GOTO"):
             jump = _GOTO.search(f"{word} {rest}")
             if jump is None:
@@ -225,6 +226,20 @@ def _target(flow: Flow, some: Statements, jump: re.Match[str]) -> int:
     if direction == "C":
         return line + 1
     raise NotReadError(f"GOTO{direction} {name}: there is no such label")
+
+
+def _case(flow: Flow, some: Statements, rest: str, value: Value) -> int:
+    """CASE value OF 1 GOTOF A 2 GOTOF B DEFAULT GOTOF C."""
+    head, _, tail = rest.partition(" OF ")
+    if not tail:
+        raise NotReadError(f"{rest[:24]!r}: CASE is followed by a value and OF")
+    number = value(head, flow.c)
+    for found in _BRANCH.finditer(tail):
+        if found[1] == "DEFAULT" or abs(value(found[1], flow.c) - number) <= EQUAL * max(1.0, abs(number)):
+            jump = _GOTO.search(f"GOTO{found[2]} {found[3]}")
+            if jump is not None:
+                return _target(flow, some, jump)
+    return flow.line + 1
 
 
 def _variable(name: str) -> int | str:

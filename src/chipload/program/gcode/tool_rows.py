@@ -6,11 +6,18 @@ of which the first 200 are read: which row holds which kind is in the profile of
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
+
+from chipload.program.gcode.state import LINEAR, nine
 
 if TYPE_CHECKING:
     from chipload.program.gcode.controller import Controller
 
+#: variables of origins: the first, the last, and the number of the work offset of the first
+ORIGINS = ((5221, 5340, 1), (7001, 7999, 10), (14001, 15999, 10))
+#: from the origin of a work offset to that of the next, and axes of one
+STRIDE, AXES = 20, 6
 #: offsets in a row of variables
 ROW = 200
 WEAR = " wear"
@@ -23,7 +30,9 @@ class ToolRows:
         self.c = controller
         #: value [mm] by kind and number, that the program has set
         self.stated: dict[tuple[str, int], float] = {}
-        if controller.control.macros.tool_variables:
+        #: called with the number of the active work offset whose origin the program has moved
+        self.moved: Callable[[int], None] | None = None
+        if controller.control.macros.tool_variables or controller.control.macros.system_variables:
             controller.parameters.row, controller.parameters.keep = self.read, self.keep
             for variable, value in controller.parameters.numbered.items():
                 if (place := self._place(variable)) is not None:
@@ -33,14 +42,43 @@ class ToolRows:
         rows = self.c.control.macros.tool_variables
         return next(((kind, variable - first + 1) for first, kind in rows.items() if 0 <= variable - first < ROW), None)
 
+    def _origin(self, variable: int) -> tuple[int, int] | None:
+        """Work offset and axis whose origin is in a variable: G54 to G59, and G54.1 P (G154 P) of a Fanuc or a Haas."""
+        if not self.c.control.macros.system_variables:
+            return None
+        for first, last, base in ORIGINS:
+            number, axis = divmod(variable - first, STRIDE)
+            if first <= variable <= last and axis < AXES:
+                return base + number, axis
+        return None
+
+    def _set_origin(self, number: int, axis: int, value: float) -> None:
+        """Put the origin of a work offset elsewhere along an axis [units of the text, deg]."""
+        c = self.c
+        if number > 9:
+            c.set_origin(number, {axis: value})
+        else:
+            at = list(c.stored(5201 + STRIDE * number))
+            at[axis] = value * (c.state.scale if axis in LINEAR else 1.0)
+            c.store(5201 + STRIDE * number, nine(at))
+            c.stated_offsets.add(number)
+        if c.state.datum.number == number and self.moved is not None:
+            self.moved(number)
+
     def read(self, variable: int) -> float | None:
         """Value of a variable [units of the text]; None where it is no tool offset or nothing states it."""
+        if (axis := self._origin(variable)) is not None and axis[0] > 9:
+            at = self.c.origins.get(axis[0], None)
+            return None if at is None else at[0][axis[1]] / (self.c.state.scale if axis[1] in LINEAR else 1.0)
         place = self._place(variable)
         value = None if place is None else self.value(*place)
         return None if value is None else value / self.c.state.scale
 
     def keep(self, variable: int, value: float) -> bool:
         """Set the offset of a variable [units of the text]; whether it is one."""
+        if (axis := self._origin(variable)) is not None:
+            self._set_origin(*axis, value)
+            return True
         place = self._place(variable)
         if place is not None:
             self.set(*place, value * self.c.state.scale)

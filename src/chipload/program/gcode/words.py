@@ -55,6 +55,8 @@ class Block:
     point : Sinumerik's words of a point without coordinates (RP, AP, ANG, AR, I1 ...): how, and the value
     pole : G110 to G112 of a Sinumerik; ``circle``: CIP, ``tangent``: CT
     pattern : Sinumerik's pattern of holes, its name and its arguments
+    returns_to : N number that M99 P goes on at; None: behind the call
+    pocket : Sinumerik's pocket, its name and its arguments
     program_call, arguments : name of the subprogram that a Sinumerik calls and how often, and its arguments
     """
 
@@ -76,8 +78,10 @@ class Block:
     circle: bool = False
     tangent: bool = False
     pattern: tuple[str, list[float | None]] | None = None
+    pocket: tuple[str, list[float | None]] | None = None
     program_call: tuple[str, int] | None = None
     arguments: list[float | None] = field(default_factory=list)
+    returns_to: int | None = None
 
 
 def bare(line: str) -> tuple[str, list[str]]:

@@ -14,13 +14,14 @@ Reference: Heidenhain, iTNC 530 User's Manual, "Cycles: Coordinate Transformatio
 
 from __future__ import annotations
 
+import cmath
 import math
 import re
 from collections.abc import Iterator
 
 from chipload.errors import InputError
 from chipload.program.commands import DWELL, LINE, RAPID
-from chipload.program.heidenhain import bore_cycles, patterns, q_cycles, words
+from chipload.program.heidenhain import bore_cycles, patterns, pocket_steps, q_cycles, words
 from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.state import ConversationalState
 from chipload.program.heidenhain.switches import datum_shift, leave_out
@@ -37,6 +38,8 @@ CHANGES = {8: "mirrored", 10: "turned", 11: "scaled", 26: "scaled"}
 MIRROR, SCALING = 8, 11
 #: factors of scaling
 LEAST_FACTOR, MOST_FACTOR = 1e-6, 100.0
+#: cycles that mill within a hole or a pocket
+MILLING = (*bore_cycles.CYCLES, *pocket_steps.CYCLES)
 PRESET, PATTERNS, WORKING_PLANE, ROTATION = 247, (220, 221), 19, 10
 _VALUE = re.compile(r"([A-Z. ]*?)\s*([-+]?\d*\.?\d+)\s*$")
 _SPATIAL = re.compile(rf"\b([ABC])\s*([-+]?)\s*({words.VALUE})")
@@ -106,6 +109,20 @@ class Cycles:
             self.number, self.values = number, {}
         elif number not in SILENT:
             s.unproven("heidenhain-cycle", f"CYCL DEF {number}: is not read: left out")
+
+    def shift_datum(self, text: str) -> None:
+        """TRANS DATUM AXIS X+10 Y+5, and its RESET: cycle 7 by another name, all axes of which it states."""
+        body = text.removeprefix("TRANS DATUM").strip()
+        if body == "RESET":
+            parts = [f"{axis}+0" for k, axis in enumerate("XYZABC") if self.s.shift[k] != 0.0]
+        elif body.startswith("AXIS"):
+            parts = body.removeprefix("AXIS").split()
+        else:
+            self.s.unproven("heidenhain-datum", f"{text[:40]}: the datum table is not known: its shift is left out")
+            return
+        for part in parts:
+            datum_shift(self.s, text, part)
+        self._report_mixed(f"CYCL DEF 7: {text}")
 
     def _q_value(self, text: str) -> float:
         if text.endswith("MAX"):
@@ -206,12 +223,12 @@ class Cycles:
         s.end_contour()
         if number is None:
             raise InputError("a cycle is called and none is defined: give CYCL DEF 1")
-        if s.factor[2] != 1.0 or (number in bore_cycles.CYCLES and (s.factor[0] != 1.0 or s.factor[1] != 1.0)):
+        if s.factor[2] != 1.0 or (number in MILLING and (s.factor[0] != 1.0 or s.factor[1] != 1.0)):
             raise NotKnownError("a cycle is called in mirrored or scaled coordinates: what it cuts here is left out")
         if number == 1:
             for motion, z, value in self._pecks(s.at[2]):
                 s.plunge(motion, z, value)
-        elif number in bore_cycles.CYCLES:
+        elif number in MILLING:
             self._bore(number)
         elif number in q_cycles.CYCLES:
             self._drill(number)
@@ -264,10 +281,21 @@ class Cycles:
                 f"CYCL DEF {number}: no radius of tool {s.tool} is known: what it cuts here is left out: state R in "
                 f"TOOL DEF, D in a tool table, or a [[cutter]] with number = {s.tool}"
             )
-        x0, y0 = s.at[:2]
-        for kind, x, y, z, feed, centre, turns in bore_cycles.bore_steps(number, self._q, radius, s.scale):
-            s.at = [x0 + x, y0 + y, z, *s.at[3:]]
-            s.row(kind, s.at, feed, (x0 + centre[0], y0 + centre[1]) if turns else (0.0, 0.0), turns)
+        middle, turn = complex(*s.at[:2]), complex(1.0, 0.0)
+        if number in pocket_steps.CYCLES:
+            steps = pocket_steps.pocket_steps(number, self._q, radius, s.scale)
+            turn = cmath.rect(1.0, math.radians(self._q(374 if number == 253 else 224, 0.0) if number != 252 else 0.0))
+            s.unproven(
+                "nc-pocket-path",
+                f"CYCL DEF {number}: the way within the pocket is the control's own: rings from its middle are taken; "
+                "its wall, floor and passes are those of the cycle",
+            )
+        else:
+            steps = bore_cycles.bore_steps(number, self._q, radius, s.scale)
+        for kind, x, y, z, feed, centre, turns in steps:
+            at, about = middle + turn * complex(x, y), middle + turn * complex(*centre)
+            s.at = [at.real, at.imag, z, *s.at[3:]]
+            s.row(kind, s.at, feed, (about.real, about.imag) if turns else (0.0, 0.0), turns)
 
     # -- patterns ---------------------------------------------------------------------------------------------
     def _pattern(self, number: int) -> None:

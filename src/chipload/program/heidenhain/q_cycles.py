@@ -15,6 +15,8 @@ SPIN to the sense of the spindle, 1 as it was or -1 reversed. A feed of MAX is r
   Q379: the hole begins so deep, entered at the feed Q253. Out at Q208, at rapid where it is not given.
 * 206 tapping with a floating chuck: feed Q206 in and out; 207 rigid tapping: the pitch Q239 times the spindle speed;
   209 the same, broken every Q257: back by Q256 pitches, 0: out of the hole.
+* 241 deep drilling with one lip: from the clearance above the start Q379 at the feed Q253, then at Q206 in plunges of
+  Q202 that become shorter, without a way out between them; out at Q208. Its speeds Q426 and Q427 are left out.
 * 240 centring to the depth Q201; by the diameter (Q343 = 1) it needs the tool's point angle, which is not known here.
 
 Reference: Heidenhain, iTNC 530 User's Manual Cycle Programming, "Drilling, tapping and thread-milling".
@@ -32,7 +34,7 @@ from chipload.units import mm_s_from_mm_min
 
 SPIN = -1
 #: cycles that are carried out
-CYCLES = (200, 201, 202, 203, 205, 206, 207, 209, 240)
+CYCLES = (200, 201, 202, 203, 205, 206, 207, 209, 240, 241)
 #: cycles that cut where they are called and are not read: the call is left out, and the program is unproven
 LEFT_OUT = frozenset({2, 3, 4, 5, 6, 12, 15, 16, 17, 18, *range(21, 26), 27, 28, 29, 39, *range(200, 300)})
 #: plunges of one hole
@@ -74,13 +76,15 @@ def q_cycle_steps(number: int, q: Value, turns_s: float, scale: float) -> Iterat
             yield from _drilling_steps(hole, hole.retraction(206), steady=False)
         elif number == 205:
             yield from _pecking_steps(hole)
+        elif number == 241:
+            yield from _single_lip_steps(hole)
         else:
             yield LINE, hole.bottom, hole.feed(206)
         if number == 206:
             yield SPIN, hole.bottom, -1.0
         if q(211, 0.0) > 0.0:
             yield DWELL, hole.bottom, q(211, 0.0)
-        if number in (201, 202, 203, 205):
+        if number in (201, 202, 203, 205, 241):
             kind, feed = hole.retraction(None if number == 205 else 206)
             yield kind, hole.top, feed
         elif number == 206:
@@ -178,6 +182,16 @@ def _pecking_steps(h: HoleValues) -> Iterator[Step]:
             yield RAPID, h.surface - done + back, 0.0
         yield LINE, h.surface - depth, feed
         done = depth
+
+
+def _single_lip_steps(h: HoleValues) -> Iterator[Step]:
+    """Plunges of 241, which follow one another."""
+    start = abs(h.mm(379, 0.0))
+    if start > 0.0:
+        yield LINE, h.surface - start + h.clearance, h.feed(253)
+    plunges = h.plunges(start, False) if h.q(202, MAX) < h.depth else [h.depth]
+    for depth in plunges:
+        yield LINE, h.surface - depth, h.feed(206)
 
 
 def _rigid_tapping(h: HoleValues, turns_s: float) -> Iterator[Step]:

@@ -220,6 +220,8 @@ class _Blocks:
             self.tools.read(s, block)
         elif re.match(r"CYCLE? DEF\b", block):
             self.cycles.define(block)
+        elif block.startswith("TRANS DATUM"):
+            self.cycles.shift_datum(block)
         elif block.startswith("PATTERN DEF"):
             self.cycles.define_pattern(block)
         elif block.startswith("CYCL CALL"):
