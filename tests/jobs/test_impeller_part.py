@@ -15,7 +15,8 @@ from chipload.geometry.sections import Blade
 from chipload.geometry.step_faces import read_faces
 from chipload.geometry.step_roles import roles_of
 from chipload.jobs import check_job, load_job
-from chipload.jobs.impeller.part import AGAINST_Z, read_part
+from chipload.jobs.impeller.flow import AGAINST_Z
+from chipload.jobs.impeller.part import read_part
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from step_files import face, turned, written
@@ -73,6 +74,16 @@ def test_the_same_impeller_in_any_frame(tmp_path, flow):
     assert found.hub.at(s, s) == pytest.approx(IMPELLER.hub.at(s, s), abs=2e-3)
     for a, b in ((found, IMPELLER), (IMPELLER, found)):
         assert a.across(0, s, s) == pytest.approx(b.across(0, s, s), abs=1e-4)
+
+
+@pytest.mark.parametrize("flow", ["+z", "-x", "+y"])
+def test_the_flow_is_found_by_the_faces_of_the_hub(tmp_path, flow):
+    path = job(tmp_path)
+    path.write_text(path.read_text().replace('flow = "-z"\n', ""))
+    model(path, rotation=AGAINST_Z[flow].T)
+    part = read_part(load_job(path).job)
+    assert part.faces[0] == f"flow: {flow} of the file, by the hub, whose narrow end is up"
+    assert apart(part.impeller.blade, IMPELLER.blade) < 1e-6
 
 
 def test_frames_are_rotations():

@@ -3,9 +3,10 @@
 import pytest
 
 from chipload.errors import InputError
+from chipload.geometry.blade_thickness import thickness
 from chipload.geometry.bspline import patch_through
 from chipload.geometry.sections import Blade
-from chipload.jobs.impeller.ray_depth import MOST, ray_depth, thickness
+from chipload.jobs.impeller.ray_depth import MOST, ray_depth
 
 
 class Wedge:
@@ -23,8 +24,8 @@ class Wedge:
 def test_thickness_of_a_wedge(thin):
     """At the distance x from the thick end it is 2 + (thin - 2) x / 60 thick; the nearest point is across it."""
     wedge = Wedge(thin)
-    assert thickness(wedge, 0, 0.0) == pytest.approx(thin, rel=0.02)
-    assert thickness(wedge, 0, 0.2) == pytest.approx(2.0 + 0.8 * (thin - 2.0), rel=0.02)
+    assert thickness(wedge.bodies[0], 0.0) == pytest.approx(thin, rel=0.02)
+    assert thickness(wedge.bodies[0], 0.2) == pytest.approx(2.0 + 0.8 * (thin - 2.0), rel=0.02)
 
 
 def test_thickness_between_the_points_that_are_tried():
@@ -32,7 +33,7 @@ def test_thickness_between_the_points_that_are_tried():
     wedge = Wedge(0.2)
     wedge.bodies = (Blade(*(patch_through([[[x, y, z] for z in (0.0, 400.0)] for x in (0.0, 30.0)], [0, 1], [0, 1])
                             for y in (0.1, -0.1))),)  # fmt: skip
-    assert thickness(wedge, 0, 0.013) == pytest.approx(0.2, rel=1e-6)
+    assert thickness(wedge.bodies[0], 0.013) == pytest.approx(0.2, rel=1e-6)
 
 
 def test_a_ray_ends_before_the_cutter_on_the_other_side():

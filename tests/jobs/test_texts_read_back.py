@@ -8,12 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chipload.errors import InputError
 from chipload.examples import copy_example
-from chipload.geometry.revolve import Revolved
 from chipload.jobs import load_job
-from chipload.jobs.impeller.part import _flow_of, _require_narrow_end_up
-from chipload.jobs.impeller.tables import ImpellerTable
 from chipload.jobs.thinwall.inputs import read_wall
 from chipload.jobs.thinwall.places import places_of
 from chipload.jobs.thinwall.tries import unlimited_plan
@@ -111,35 +107,3 @@ def test_down_milling_of_a_left_hand_cutter_has_the_rows_of_up_milling(plate: Pa
     np.testing.assert_allclose(left.p_work, up.p_work, atol=1e-9)
     cuts = up.motion != RAPID
     assert (left.spindle[cuts] == -up.spindle[cuts]).all()
-
-
-HUB = [[20.0, 40.0], [24.0, 15.0], [60.0, 0.0]]
-
-
-def impeller_table(over: bool | None) -> ImpellerTable:
-    sections = {
-        "blade": ("b.csv",), "hub": "h.csv", "shroud": "s.csv", "unit": "mm", "flow_along_x": over, "hub_ahead_mm": 1.0
-    }  # fmt: skip
-    return ImpellerTable.model_validate({"blades": 7, "outer_diameter_mm": 120.0, "sections": sections})
-
-
-def test_the_flow_follows_from_the_hub() -> None:
-    """A hub that widens towards the table is milled from above; turned over it is refused, with the value to state."""
-    upright, over = Revolved(np.array(HUB), 1), Revolved(np.array(HUB) * (1.0, -1.0), 1)
-    _require_narrow_end_up(upright, impeller_table(True))
-    with pytest.raises(InputError, match=r"flow_along_x = true: the hub would be 60 mm .* 20 mm .*: state false"):
-        _require_narrow_end_up(over, impeller_table(True))
-    with pytest.raises(InputError, match=r"flow_along_x = false: .*: state true"):
-        _require_narrow_end_up(over, impeller_table(False))
-
-
-@pytest.mark.parametrize("over", [True, False])
-def test_the_flow_that_is_not_stated_is_found(tmp_path: Path, over: bool) -> None:
-    """The file's X goes down from the narrow end where the flow comes along it."""
-    given = impeller_table(None).sections
-    assert given is not None
-    (tmp_path / "h.csv").write_text("".join(f"{-z if over else z} {r}\n" for r, z in HUB))
-    assert _flow_of(tmp_path, given) is over
-    (tmp_path / "h.csv").write_text("0.0 20.0\n20.0 23.0\n40.0 20.1\n")
-    with pytest.raises(InputError, match=r"flow_along_x: missing: the hub is 20 and 20.1 mm .*: state true where"):
-        _flow_of(tmp_path, given)

@@ -28,6 +28,9 @@ FILES = {
     "machines_tools/better_tool_library/Shape/slittingsaw.fcstd": ("contour", 'file = "part.step"'),
     "cad/tblade3_rotor/Case_7-28-8_Rotor.step": ("thinwall", "front = 2"),
     "blades/turbogrid_rotor37/profile.curve": ("thinwall", 'unit = "cm"'),
+    "blades/turbogrid_rotor37/BladeGen.inf": ("impeller", "blades = 36"),
+    "blades/turbogrid_hannover4ac/3_Rotor2_Blade.inf": ("impeller", "outer_diameter_mm = 354.691"),
+    "blades/pyturbo_radial/centrif_compressor_mainblade_xyz_pts.csv": ("impeller", 'unit = "m"'),
 }
 
 

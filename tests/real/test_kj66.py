@@ -12,7 +12,8 @@ from chipload.examples import copy_example
 from chipload.geometry.step_faces import read_faces
 from chipload.jobs import check_job, load_job, run_job
 from chipload.jobs.impeller.flank import checked_flanks
-from chipload.jobs.impeller.part import AGAINST_Z, read_part
+from chipload.jobs.impeller.flow import AGAINST_Z
+from chipload.jobs.impeller.part import read_part
 from chipload.jobs.impeller.paths import finish_settings
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.tables import index_table

@@ -13,7 +13,8 @@ from chipload.examples import copy_example
 from chipload.geometry.sections import check_sections, loft
 from chipload.geometry.thin_wall import through_sections
 from chipload.jobs import check_job, load_job, run_job
-from chipload.jobs.impeller.part import AGAINST_Z, read_part
+from chipload.jobs.impeller.flow import AGAINST_Z
+from chipload.jobs.impeller.part import read_part
 from chipload.jobs.thinwall.faces import wall_of_faces
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))

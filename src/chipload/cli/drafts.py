@@ -17,7 +17,7 @@ File = Annotated[
     Path,
     typer.Argument(
         metavar="FILE",
-        help="NC program, CL data, CAMotics project, DXF, STEP, STL, FreeCAD document, or blade sections",
+        help="NC program, CL data, CAMotics project, DXF, STEP, STL, FreeCAD document, BladeGen.inf, or blade sections",
     ),
 ]
 Looked = Annotated[Path, typer.Argument(metavar="FILE", help="a file that init accepts, or the job.toml that it wrote")]

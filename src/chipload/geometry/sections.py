@@ -6,8 +6,8 @@ u in 0..1 runs along a section from its leading to its trailing edge, v from the
 
 Formats: tables of three columns, one section per file, whose first line names the columns `X R*THETA R`,
 `X R THETA_DEG` or `X Y Z` (NASA's HECC; X of the first two is along the axis); TurboGrid `.curve` and `.crv` with
-columns x y z and sections separated by lines that begin with #; tables of pyturbo-aero with all sections
-(``section_table.py``). The files do not state a unit, so the caller states it.
+columns x y z and sections separated by lines that begin with #, several blades by lines that begin with ##; tables of
+pyturbo-aero with all sections (``section_table.py``). The files do not state a unit, so the caller states it.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ FARTHEST = 1e6
 _LEAST_POINTS = 12
 _EDGE = 0.03  # share of its length: a profile whose first point is this near to an end begins at that edge
 _OUTER = 0.02  # greatest relative difference of the outer diameter from the stated one
+#: order of the columns x y z that brings the axis of rotation to the last place
+AXES = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +55,12 @@ class Blade:
 
 
 def read_sections(
-    paths: Sequence[str | Path], unit: str, over: bool = False, columns: str | None = None
+    paths: Sequence[str | Path],
+    unit: str,
+    over: bool = False,
+    columns: str | None = None,
+    axis: str = "z",
+    body: int = 0,
 ) -> tuple[Floats, ...]:
     """Sections of one blade from files in order from hub to shroud.
 
@@ -62,8 +69,10 @@ def read_sections(
     Parameters
     ----------
     unit : unit of length of the files, a key of ``units.MM_PER``
-    over : rotate the part by 180 deg about x, so that a flow along +x in the file runs along -z
+    over : rotate the part by 180 deg about x, so that a flow along the axis in the file runs along -z
     columns : names of the columns of files whose first line does not state them; other files must agree
+    axis : axis of rotation in files with the columns x y z, a key of :data:`AXES`
+    body : which blade of a file that contains several, 0 the first; a file with one blade has no others
 
     Returns
     -------
@@ -76,16 +85,16 @@ def read_sections(
     """
     out: list[Floats] = []
     for path in paths:
-        out += _sections_of(Path(path), _scale(unit), columns)
+        out += _sections_of(Path(path), _scale(unit), columns, AXES[axis], body)
     return tuple(p * np.array([1.0, -1.0, -1.0]) if over else p for p in out)
 
 
-def read_meridian(path: str | Path, unit: str, over: bool = False, shroud: bool = False) -> Floats:
-    """Meridional curve of a hub or shroud, (n, 2) float [mm] r and z.
+def read_meridian(path: str | Path, unit: str, over: bool = False, shroud: bool = False, axis: str = "z") -> Floats:
+    """Meridional curve of a hub or shroud, (n, 2) float [mm] r and z, from the end with the greatest z - r (inlet).
 
-    The file has two columns `x r`, or three columns x y z with z along the axis (TurboGrid). From a table of all
-    sections (pyturbo-aero), the first section gives the hub; with ``shroud`` the last one gives the shroud. ``unit``
-    and ``over`` are as in :func:`read_sections`.
+    The file has two columns `x r`, or three columns x y z (TurboGrid). From a table of all sections (pyturbo-aero), the
+    first section gives the hub; with ``shroud`` the last one gives the shroud. ``unit``, ``over`` and ``axis`` are as
+    in :func:`read_sections`.
 
     Raises
     ------
@@ -96,14 +105,23 @@ def read_meridian(path: str | Path, unit: str, over: bool = False, shroud: bool 
     found = meridian_of_table(_text(Path(path)), Path(path), shroud)
     if found is not None:
         r, z = _finite(found * scale, Path(path)).T
-        return np.stack([r, -z if over else z], axis=-1)
+        return _from_inlet(np.stack([r, -z if over else z], axis=-1))
     rows = [row for block in _blocks(Path(path)) for row in block[1]]
     if len({len(row) for row in rows}) > 1:
         raise InputError(f"{path}: blocks of 2 and of 3 columns: must have the same number in every block")
     p = _finite(np.array(rows) * scale, Path(path))
     if p.shape[1] == 3:
+        p = p[:, AXES[axis]]
         p = np.stack([p[:, 2], np.hypot(p[:, 0], p[:, 1])], axis=-1)
-    return np.stack([p[:, 1], -p[:, 0] if over else p[:, 0]], axis=-1)
+    return _from_inlet(np.stack([p[:, 1], -p[:, 0] if over else p[:, 0]], axis=-1))
+
+
+def _from_inlet(meridian: Floats) -> Floats:
+    """A meridian (n, 2) r and z from its end with the greatest z - r, each of its points once."""
+    differs = np.linalg.norm(np.diff(meridian, axis=0), axis=1) > 0.0
+    meridian = meridian[np.concatenate([[True], differs])]
+    first = meridian[:, 1] - meridian[:, 0]
+    return meridian[::-1] if first[-1] > first[0] else meridian
 
 
 def check_sections(sections: tuple[Floats, ...], outer_diameter: float | None = None) -> tuple[Floats, ...]:
@@ -250,7 +268,7 @@ def _scale(unit: str) -> float:
     return MM_PER[unit]
 
 
-def _sections_of(path: Path, scale: float, columns: str | None) -> list[Floats]:
+def _sections_of(path: Path, scale: float, columns: str | None, order: tuple[int, int, int], body: int) -> list[Floats]:
     table = sections_of_table(_text(path), path)
     if table is not None:
         if columns is not None:
@@ -258,7 +276,7 @@ def _sections_of(path: Path, scale: float, columns: str | None) -> list[Floats]:
         return [_finite(p * scale, path) for p in table]
     out = []
     stated = "X Y Z" if path.suffix.lower() in (".curve", ".crv") else columns
-    for names, rows in _blocks(path):
+    for names, rows in _blocks_of_blade(path, body):
         p = np.array(rows)
         if p.shape[1] != 3:
             raise InputError(f"{path}: {p.shape[1]} columns: must be 3")
@@ -268,7 +286,7 @@ def _sections_of(path: Path, scale: float, columns: str | None) -> list[Floats]:
         if columns is not None and found != columns:
             raise InputError(f"{path}: columns {found}: must be {columns} as stated")
         if found == "X Y Z":
-            out.append(_finite(p * scale, path))
+            out.append(_finite(p[:, order] * scale, path))
             continue
         if found == "X R*THETA R":
             if (p[:, 2] <= 0.0).any():
@@ -290,13 +308,24 @@ def _finite(p: Floats, path: Path) -> Floats:
 
 
 def _text(path: Path) -> str:
-    return read_regular(path, str(path), _LARGEST_FILE, "not a table of points").decode("utf-8", "replace")
+    return read_regular(path, str(path), _LARGEST_FILE, "not a table of points").decode("utf-8-sig", "replace")
 
 
-def _blocks(path: Path) -> list[tuple[list[str], list[list[float]]]]:
-    """(names of the columns, rows) of each block of a file."""
+def _blocks_of_blade(path: Path, body: int) -> list[tuple[list[str], list[list[float]]]]:
+    """Blocks of one blade of a file: of all of it, or those after the line ## number ``body`` + 1."""
+    lines = _text(path).splitlines()
+    begins = [k for k, line in enumerate(lines) if line.lstrip().startswith("##")]
+    if not begins:
+        return _blocks(path)
+    if body >= len(begins):
+        raise InputError(f"{path}: {len(begins)} blades (lines that begin with ##): must have at least {body + 1}")
+    return _blocks(path, begins[body], begins[body + 1] if body + 1 < len(begins) else None)
+
+
+def _blocks(path: Path, first: int = 0, last: int | None = None) -> list[tuple[list[str], list[list[float]]]]:
+    """(names of the columns, rows) of each block of a file, or of a part of its lines."""
     blocks: list[tuple[list[str], list[list[float]]]] = [([], [])]
-    for k, line in enumerate(_text(path).splitlines(), 1):
+    for k, line in enumerate(_text(path).splitlines()[first:last], first + 1):
         words = line.replace(",", " ").split()
         if not words:
             continue

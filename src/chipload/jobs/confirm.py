@@ -59,6 +59,8 @@ def guesses_of(tables: Collection[str], text: str, stated: Collection[str] = ())
 
     >>> guesses_of(["cutter.0"], "[[cutter]]\nconfirm = true\nflutes = 3  # guess: no file states them\nnumber = 1")
     ('cutter.0.flutes = 3: no file states them (line 3)',)
+    >>> guesses_of(["operation.0.paths"], "[[operation]]\n[operation.paths]\ngouge_mm = 0.1  # guess: usual")
+    ('operation.0.paths.gouge_mm = 0.1: usual (line 3)',)
     """
     found: list[str] = []
     counted: Counter[str] = Counter()
@@ -70,6 +72,9 @@ def guesses_of(tables: Collection[str], text: str, stated: Collection[str] = ())
             if header[1] == "[[":
                 table = f"{header[2]}.{counted[header[2]]}"
                 counted[header[2]] += 1
+            elif (above := header[2].partition("."))[0] in counted:
+                # a table within the last one of a list
+                table = f"{above[0]}.{counted[above[0]] - 1}.{above[2]}"
         elif table in tables and (guess := _GUESS.match(line)):
             seen.add(table)
             if f"{table}.{guess[1]}" not in stated:

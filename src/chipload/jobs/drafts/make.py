@@ -19,7 +19,7 @@ def draft_of(
 
     Parameters
     ----------
-    file : NC text, CL data, a CAMotics project, DXF, STEP, STL, FreeCAD document or blade sections
+    file : NC text, CL data, a CAMotics project, DXF, STEP, STL, FreeCAD document, BladeGen.inf or blade sections
     folder : of the job, to which file names are relative
     machine : a shipped name or a file (TOML); None: guessed
     tools : a LinuxCNC tool table of a program, or a tool library of Fusion, whose tools are assigned by number
@@ -54,8 +54,11 @@ def draft_of(
 
         return draft_mesh(file, folder, machine)
     from chipload.jobs.drafts.blade import draft_sections, holds_sections
+    from chipload.jobs.drafts.impeller import draft_impeller, holds_impeller
     from chipload.jobs.drafts.program import Known, draft_program
 
+    if holds_impeller(file):
+        return draft_impeller(file, folder, machine)
     if holds_sections(file):
         return draft_sections(file, folder, machine)
     if tools is not None and tools.suffix.lower() in (".json", ".tools"):

@@ -35,6 +35,8 @@ TABLES = {
     "wall": ("is the wall the right one", "shape and stock"),
     "workpiece": ("how stiff is the workpiece", "its deflection"),
     "part": ("is the part read right", "what is finished"),
+    "impeller": ("how many blades are there", "the width between them, and which cutters fit"),
+    "catalogue": ("which cutters are there", "which one is chosen, and what it reaches"),
 }
 #: keys of a cutter that decide what it removes
 SHAPE = ("diameter_mm", "corner_radius_mm", "body_mm", "taper_deg")

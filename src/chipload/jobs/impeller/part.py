@@ -22,6 +22,7 @@ from chipload.geometry.step_faces import Face, Model, Name, read_faces
 from chipload.geometry.step_meridian import meridian_of
 from chipload.geometry.step_patch import four_sided, patch_of
 from chipload.geometry.step_side import side_of
+from chipload.jobs.impeller.flow import AGAINST_Z, flow_of_faces, flow_of_sections, require_narrow_end_up
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.tables import ImpellerTable, SectionsTable, ShapeTable, StepTable
 from chipload.jobs.tables import require_stated
@@ -31,16 +32,8 @@ from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.surfaces import BODIES
 
 Floats = NDArray[np.float64]
-#: a hub whose ends differ by less than this share of the radius has no wide end
-SAME_RADIUS = 0.02
 #: faces of one side
 Names = Name | tuple[Name, ...]
-
-_CYCLE = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-_OVER = np.diag([1.0, -1.0, -1.0])
-#: rotation from a file's frame to that whose axis is z, by the way the flow comes in; +x as sections with flow_along_x
-AGAINST_Z = {"-z": np.eye(3), "-x": _CYCLE, "-y": _CYCLE @ _CYCLE}
-AGAINST_Z |= {key.replace("-", "+"): _OVER @ R for key, R in AGAINST_Z.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +54,8 @@ def read_part(job: ImpellerJob) -> ImpellerPart:
     """
     part = job.table.impeller
     plain = _without_fillets(job)
-    if part.step is not None or (part.sections is not None and part.sections.flow_along_x is not None):
-        _require_narrow_end_up(plain.impeller.hub, part)
+    if _states_flow(part):
+        require_narrow_end_up(plain.impeller.hub, part)
     if part.fillet_mm is None:
         return plain
     made, fillet_lines = with_fillets(plain.impeller, part.fillet_mm)
@@ -73,46 +66,10 @@ def read_part(job: ImpellerJob) -> ImpellerPart:
     return ImpellerPart(made, (*plain.faces, *fillet_lines, *not_milled))
 
 
-def _require_narrow_end_up(hub: Revolved, part: ImpellerTable) -> None:
-    """Refuse a part whose hub widens upwards: the stated flow contradicts the geometry, and no cutter from above would
-    reach between the blades.
-    """
-    low, high = _end_radii(hub)
-    if high <= (1.0 + SAME_RADIUS) * low:
-        return
-    key, value, other = "impeller.sections.flow_along_x", "true", "false"
+def _states_flow(part: ImpellerTable) -> bool:
     if part.step is not None:
-        key, value = "impeller.step.flow", str(part.step.flow)
-        other = ("-" if value.startswith("+") else "+") + value[1:]
-    elif not require_stated(part.sections, "impeller.sections").flow_along_x:
-        value, other = other, value
-    raise InputError(
-        f"{key} = {value}: the hub would be {high:.4g} mm in radius at its upper end, {low:.4g} mm at the table: the "
-        f"part is milled with the narrow end of its hub upwards: state {other}"
-    )
-
-
-def _end_radii(hub: Revolved) -> tuple[float, float]:
-    """Radii of a hub at its lower and at its upper end [mm]."""
-    z = hub.meridian[:, 1]
-    return float(hub.meridian[z.argmin(), 0]), float(hub.meridian[z.argmax(), 0])
-
-
-def _flow_of(folder: Path, given: SectionsTable) -> bool:
-    """Whether the flow comes along +X of the files: the part is milled with the narrow end of its hub upwards.
-
-    Raises
-    ------
-    InputError
-        The ends of the hub are as wide as one another.
-    """
-    low, high = _end_radii(Revolved(read_meridian(folder / given.hub, given.unit, False, False), 1))
-    if max(low, high) <= (1.0 + SAME_RADIUS) * min(low, high):
-        raise InputError(
-            f"impeller.sections.flow_along_x: missing: the hub is {low:.4g} and {high:.4g} mm in radius at its ends, "
-            "which do not tell where the flow comes from: state true where it comes along +X of the files, else false"
-        )
-    return high > low
+        return part.step.flow is not None
+    return part.sections is not None and part.sections.flow_along_x is not None
 
 
 def _without_fillets(job: ImpellerJob) -> ImpellerPart:
@@ -121,10 +78,12 @@ def _without_fillets(job: ImpellerJob) -> ImpellerPart:
         return _of_step(job.files, part.step, part.blades, part.outer_diameter_mm)
     if part.sections is not None:
         folder, given = job.path.parent, part.sections
-        over = given.flow_along_x if given.flow_along_x is not None else _flow_of(folder, given)
+        over, reason = given.flow_along_x, ""
+        if over is None:
+            over, reason = flow_of_sections(folder, given)
         made = _of_sections(folder, given, over, part.blades, part.outer_diameter_mm)
-        found = f"flow: along {'+' if over else '-'}X of the files, by the hub, whose narrow end is up"
-        return ImpellerPart(made, (found,) if given.flow_along_x is None else ())
+        flow_text = f"flow: {'along' if over else 'against'} the axis of the files, {reason}"
+        return ImpellerPart(made, (flow_text,) if reason else ())
     return ImpellerPart(_of_shape(require_stated(part.shape, "impeller.shape"), part.blades, part.outer_diameter_mm))
 
 
@@ -140,8 +99,11 @@ def _of_sections(folder: Path, given: SectionsTable, over: bool, blades: int, ou
     """The impeller through sections of points; ``over``: the flow comes along +X of the files."""
 
     def blade(names: tuple[str, ...], key: str) -> tuple[Blade, tuple[Floats, ...]]:
+        # a splitter is the second blade of the files that the blade is in
+        body = 1 if key == "splitter" and set(names) <= set(given.blade) else 0
         try:
-            found = read_sections([folder / name for name in names], given.unit, over, given.columns)
+            paths = [folder / name for name in names]
+            found = read_sections(paths, given.unit, over, given.columns, given.axis, body)
             return loft(check_sections(found, outer_diameter)), found
         except InputError as err:
             raise InputError(f"impeller.sections.{key}: {err}") from None
@@ -154,21 +116,28 @@ def _of_sections(folder: Path, given: SectionsTable, over: bool, blades: int, ou
         except InputError as err:
             raise InputError(f"impeller.sections.splitter: {err}") from None
     hub, shroud = (
-        Revolved(read_meridian(folder / name, given.unit, over, side < 0), side)
+        Revolved(read_meridian(folder / name, given.unit, over, side < 0, given.axis), side)
         for name, side in ((given.hub, 1), (given.shroud, -1))
     )
     return Impeller(main, splitter, hub, shroud, blades)
 
 
 def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diameter: float) -> ImpellerPart:
-    model, R = read_faces(files["step"], "impeller.step.file"), AGAINST_Z[given.flow]
-    lines: list[str] = []
+    model, lines = read_faces(files["step"], "impeller.step.file"), list[str]()
+    flow = given.flow
+    if flow is None:
+        at = "impeller.step.hub"
+        if isinstance(given.hub, str):
+            raise InputError(f"impeller.step.flow: missing: the points of {given.hub} do not tell it: state it")
+        flow, reason = flow_of_faces([model.face(name, at) for name in given.hub], at)
+        lines.append(f"flow: {flow} of the file, {reason}")
+    R = AGAINST_Z[flow]
 
     def revolved(key: str, side: int) -> Revolved:
         names = getattr(given, key)
         if isinstance(names, str):
             unit = require_stated(given.unit, "impeller.step.unit")
-            return Revolved(read_meridian(files[key], unit, given.flow.startswith("+"), side < 0), side)
+            return Revolved(read_meridian(files[key], unit, flow.startswith("+"), side < 0), side)
         at = f"impeller.step.{key}"
         faces = [model.face(name, at) for name in names]
         numbers = [f.number for f in faces]

@@ -47,7 +47,9 @@ class SectionsTable(Table):
 
     blade: tuple[Text, ...] = Field(min_length=1, description="files with the sections of a blade, from hub to shroud")
     splitter: tuple[Text, ...] = Field(
-        (), description="files with the sections of a splitter, from hub to shroud; none: no splitters"
+        (),
+        description="files with the sections of a splitter, from hub to shroud; a file of `blade`: its second blade; "
+        "none: no splitters",
     )
     hub: Text = Field(
         description="file of points of the hub, or a table of all sections, whose first section lies on it"
@@ -59,10 +61,11 @@ class SectionsTable(Table):
     columns: Literal["X R*THETA R", "X R THETA_DEG", "X Y Z"] | None = Field(
         None, description="columns of files that do not name them"
     )
+    axis: Literal["x", "y", "z"] = Field("z", description="axis of rotation in files with columns X Y Z")
     flow_along_x: bool | None = Field(
         None,
-        description="true: the flow comes along +X of the files; the part is then turned over; default: so that the "
-        "narrow end of the hub is up",
+        description="true: the flow comes along +X (the axis) of the files; the part is then turned over; default: by "
+        "the shape, so that the narrow end of the hub is up",
     )
     hub_ahead_mm: NotNegative = Field(description="length of the hub upstream of the leading edge")
 
@@ -74,8 +77,10 @@ class StepTable(Table):
     """
 
     file: Text = Field(description="STEP file; `chipload check FILE` lists its faces")
-    flow: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
-        description="direction of the incoming flow along the axis of rotation, which contains the origin"
+    flow: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None = Field(
+        None,
+        description="direction of the incoming flow along the axis of rotation, which contains the origin; default: "
+        "by the faces of the hub, so that its narrow end is up",
     )
     plus: SideFaces = Field(
         description="side of a blade that faces a growing angle about the axis, seen against the flow"
