@@ -74,6 +74,19 @@ def clamp(job: Job) -> None:
     job.tables["fixture"] = [{"file": "clamp.stl", "units": "mm", "spacing_mm": 3.0}]
 
 
+def bracket(job: Job) -> None:
+    """A block beside the part, above a tool that lies across the axis."""
+    box = trimesh.creation.box(bounds=[[100.0, -40.0, 75.0], [160.0, 40.0, 105.0]])
+    job.files["bracket.stl"] = bytes(box.export(file_type="stl"))
+    job.tables["fixture"] = [{"file": "bracket.stl", "units": "mm", "spacing_mm": 3.0}]
+
+
+def bracket_at_an_index_angle(job: Job) -> None:
+    """The same block, with the index table at an angle at which the holder stands where it is."""
+    bracket(job)
+    job.tables["operation"][0]["table_deg"] = [50.0]
+
+
 def without_pallet(job: Job) -> None:
     """Nothing that lies below the part is stated."""
     del job.tables["machine_table"]
@@ -113,6 +126,14 @@ CASES = (
         "below-stock",
     ),
     case("impeller-clamp-in-the-way", "a clamp in the way in another channel", clamp, "exceeds", "collision"),
+    case("impeller-bracket", "nothing: a block above the tool, which it does not meet", bracket, "holds"),
+    case(
+        "impeller-bracket-at-an-index-angle",
+        "a block that the holder meets at another angle of the index table only",
+        bracket_at_an_index_angle,
+        "exceeds",
+        "collision",
+    ),
     case(
         "impeller-stock-not-stated",
         "finishing programs whose stock before them is not stated",

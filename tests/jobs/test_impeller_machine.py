@@ -311,3 +311,20 @@ def test_what_is_not_stated_is_listed(milled) -> None:
     assert [c.text for c in result_of(milled).tracks[0].limits] == [
         "all contact points reached", "all contact points certified",
     ]  # fmt: skip
+
+
+def test_what_no_program_mills_is_listed_with_its_share(milled) -> None:
+    """By triangles of the side, whose areas are added where their middle lies in the range of the job."""
+    (text,) = (x for x in result_of(milled).unchecked if x.startswith("not milled: "))
+    parts = text.removeprefix("not milled: ").split("; ")
+    assert parts[-2:] == ["blade floor", "leading and trailing edges and tips of all blades"]
+    for part, side in zip(parts[:2], ("plus", "minus"), strict=True):
+        stated, rest = part.split(" % of blade ")
+        assert rest == f"{side}, beyond 0.3 to 0.34 along and 0.5 to 0.56 up"
+        t, w = np.linspace(0.0, 1.0, 101), np.linspace(0.0, 1.0, 51)
+        grid = getattr(milled.impeller.blade, side).at(*(x.ravel() for x in np.meshgrid(t, w, indexing="ij")))
+        p = grid.reshape(101, 51, 3)
+        a, b, c, d = p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]
+        cell = 0.5 * sum(np.linalg.norm(np.cross(y - x, z - x), axis=2) for x, y, z in ((a, b, c), (a, c, d)))
+        left = 100.0 * (1.0 - cell[30:34, 25:28].sum() / cell.sum())
+        assert float(stated) == pytest.approx(left, abs=0.06)

@@ -31,6 +31,7 @@ from chipload.jobs.impeller.paths import walls_of
 from chipload.jobs.impeller.program_removal import ProgramRemoval
 from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.jobs.impeller.roughing_check import CheckedRough
+from chipload.jobs.impeller.surfaces_without_program import surfaces_without_program
 from chipload.jobs.impeller.tool_clearance import clearance_blocks
 from chipload.number_text import number_text
 from chipload.report.bodies import MACHINE_TABLE
@@ -301,6 +302,8 @@ def _unchecked_texts(milled: ImpellerResult) -> tuple[str, ...]:
         *(_unchecked_removal(found) if milled.programs is not None else ()),
         *(_unchecked_machine(milled) if milled.programs is not None else ()),
     ]
+    if milled.programs is not None:
+        out.append(surfaces_without_program(milled))
     out += milled.not_on_five_axes
     if milled.programs is None:
         out.append("programs: the job states no [operation.paths]")
