@@ -7,7 +7,7 @@ of the blades is taken as the leading one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +76,7 @@ def flow_of_faces(faces: Sequence[Face], key: str) -> tuple[str, str]:
         The faces are not of revolution about an axis of the file, or their ends are as wide as one another.
     """
     for axis in "xyz":
-        meridian = _meridian_if_any(lambda axis=axis: meridian_of(faces, AGAINST_Z[f"-{axis}"], key))
+        meridian = _meridian_if_any(faces, AGAINST_Z[f"-{axis}"], key)
         if meridian is None:
             continue
         low, high = _end_radii(meridian)
@@ -92,10 +92,10 @@ def flow_of_faces(faces: Sequence[Face], key: str) -> tuple[str, str]:
     )
 
 
-def _meridian_if_any(read: Callable[[], Floats]) -> Floats | None:
-    """A meridian, or nothing where the faces have none about its axis."""
+def _meridian_if_any(faces: Sequence[Face], R: Floats, key: str) -> Floats | None:
+    """The meridian of faces about an axis, or nothing where they are not of revolution about it."""
     try:
-        return read()
+        return meridian_of(faces, R, key)
     except InputError:
         return None
 

@@ -124,8 +124,8 @@ def _of_sections(folder: Path, given: SectionsTable, over: bool, blades: int, ou
 
 def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diameter: float) -> ImpellerPart:
     model, lines = read_faces(files["step"], "impeller.step.file"), list[str]()
-    flow = given.flow
-    if flow is None:
+    flow: str = given.flow or ""
+    if not flow:
         at = "impeller.step.hub"
         if isinstance(given.hub, str):
             raise InputError(f"impeller.step.flow: missing: the points of {given.hub} do not tell it: state it")
