@@ -59,11 +59,11 @@ def read_part(job: ImpellerJob) -> ImpellerPart:
     if part.fillet_mm is None:
         return plain
     made, fillet_lines = with_fillets(plain.impeller, part.fillet_mm)
-    milled = {(s.body, s.side) for s in job.table.surface}
+    named = {(s.body, s.side) for s in job.table.surface}
     names = [(b, f"{k} fillet") for b in BODIES[: len(made.bodies)] for k in ("plus", "minus")]
-    left = [" ".join(name) for name in names if name not in milled]
-    not_milled = (f"not milled: no [[surface]] names it: {', '.join(left)}",) if left else ()
-    return ImpellerPart(made, (*plain.faces, *fillet_lines, *not_milled))
+    left = [" ".join(name) for name in names if name not in named]
+    rest_text = (f"not milled: no [[surface]] names it: {', '.join(left)}",) if left else ()
+    return ImpellerPart(made, (*plain.faces, *fillet_lines, *rest_text))
 
 
 def _states_flow(part: ImpellerTable) -> bool:
