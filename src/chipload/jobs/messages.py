@@ -122,8 +122,8 @@ def _line(e: Any, root: type[BaseModel], foreign: Collection[str] = ()) -> str:
         return f"{key} = {value}: must be a finite number{_key_meaning(loc, root)}"
     if kind == "literal_error":
         expected = str(context["expected"]).replace(" or ", ", ")
-        known = [word.strip("'") for word in expected.split(", ")]
-        near = difflib.get_close_matches(str(e["input"]), known, 1) if len(known) > 1 else []
+        options = [word.strip("'") for word in expected.split(", ")]
+        near = difflib.get_close_matches(str(e["input"]), options, 1) if len(options) > 1 else []
         return f"{key} = {value}: must be one of {expected}{f': did you mean {near[0]}?' if near else ''}"
     if kind in ("value_error", "assertion_error"):
         return f"{key} = {value}: {context['error']}{_key_meaning(loc, root)}"

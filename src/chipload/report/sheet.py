@@ -199,9 +199,9 @@ def table(
         return "".join(f"<{tag}{' class=n' if i in numbers else ''}>{x}</{tag}>" for i, x in enumerate(row))
 
     head, rows = list(head), list(rows)
-    marks, below = list(used) or [False] * len(rows), list(notes) or [""] * len(rows)
+    marks, texts = list(used) or [False] * len(rows), list(notes) or [""] * len(rows)
     lines = list[str]()
-    for row, mark, note in zip(rows, marks, below, strict=True):
+    for row, mark, note in zip(rows, marks, texts, strict=True):
         names = " ".join(name for name, on in (("used", mark), ("noted", bool(note))) if on)
         kind = f' class="{names}"' if names else ""
         lines.append(f"<tr{kind}>{cells('td', row)}</tr>")
