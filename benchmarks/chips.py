@@ -206,7 +206,7 @@ def finishing(points: int, layer: float = 0.3, corner: int = 16, at: list | None
         if at is not None:
             at.append((share, time.process_time() - own))
 
-    removal = remove(program, stock, {1: BALL}, material_named("al7075-t6"), resolution, progress=note, engine="layers")
+    removal = remove(program, stock, {1: BALL}, material_named("al7075-t6"), resolution, progress=note)
     return time.perf_counter() - wall, time.process_time() - own, removal
 
 

@@ -1,4 +1,4 @@
-"""The engines: steps a second, error against a converged setting and against one another, beside another simulator.
+"""The moves: steps a second, error against a converged setting, beside another simulator.
 
     python benchmarks/engines.py [--moves 20000] [--job 1000000] [--real 1500] [--planned FOLDER] [--others] [--fresh]
                                  [--check] [--write]
@@ -49,8 +49,8 @@ ALLOY = material_named("al7075-t6")
 #: goals: moves a second with loads, p99 of the greatest force [%], seconds of 10^6 moves, memory [MB]
 GOALS = {"finishing": (20_000.0, 3.0), "roughing": (40_000.0, 2.0)}
 MILLION_S, MILLION_MB = 120.0, 1000.0
-#: steps a second by engine: of the boat in five axes and of the bear by layers; moves over PathSim
-BOAT, BEAR, PEER = {"moves": 3000.0, "layers": 1000.0}, 1500.0, 5.0
+#: steps a second of the boat in five axes; moves over PathSim
+BOAT, PEER = 3000.0, 5.0
 #: energy balance: sum of the chips against the converged one [%]
 VOLUME = 0.2
 #: slices of a corner of a job that states none
@@ -69,7 +69,7 @@ def simulated(
     stock = LayeredStock.block(case.low, case.high, 2.0, 32.0)
     fine = Resolution(step_mm=3.0, tolerance=1e-3, corner_slices=pieces, flank_mm=flank)
     begun = time.process_time()
-    removal = remove(case.program, stock, case.cutters, ALLOY, fine, engine="moves", accuracy=accuracy)
+    removal = remove(case.program, stock, case.cutters, ALLOY, fine, accuracy=accuracy)
     return time.process_time() - begun, dict(removal.columns)
 
 
@@ -130,23 +130,15 @@ def command_line(moves: int) -> tuple[float, float]:
     return used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime, used.ru_maxrss / 1024.0
 
 
-def both(case: Case) -> tuple[dict[str, float], dict[str, list[float]]]:
-    """Steps a second by engine, and p50, p95, p99 [%] by which layers differ from moves in a column."""
-    rates, columns = dict[str, float](), dict[str, dict[str, NDArray[np.generic]]]()
+def rate_of(case: Case) -> float:
+    """Steps a second."""
     smallest = min(c.radius for c in case.cutters.values())
     fine = Resolution(case.step_mm, 0.01, SLICES // 2, 0.5 * smallest)
-    for engine in ("moves", "layers"):
-        stock = LayeredStock.block(case.low, case.high, case.layer_mm, 4.0 * smallest)
-        remove(head(case.program, 12), stock.copied(), case.cutters, ALLOY, fine, engine=engine, accuracy=False)
-        begun = time.process_time()
-        removal = remove(case.program, stock, case.cutters, ALLOY, fine, engine=engine, accuracy=False)
-        columns[engine] = dict(removal.columns)
-        rates[engine] = len(removal.columns["line"]) / (time.process_time() - begun)
-    errors = {}
-    if len(columns) == 2:
-        known, some = columns["moves"], columns["layers"]
-        errors = {name: p_of(some[name], known[name]) for name in COLUMNS[:3]}
-    return rates, errors
+    stock = LayeredStock.block(case.low, case.high, case.layer_mm, 4.0 * smallest)
+    remove(head(case.program, 12), stock.copied(), case.cutters, ALLOY, fine, accuracy=False)
+    begun = time.process_time()
+    removal = remove(case.program, stock, case.cutters, ALLOY, fine, accuracy=False)
+    return len(removal.columns["line"]) / (time.process_time() - begun)
 
 
 def beside_pathsim(moves: int) -> tuple[float, float] | None:
@@ -195,21 +187,15 @@ def written(text: str) -> None:
     NOTE.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.partition(END)[2]}")
 
 
-def of_programs(cases: Iterable[Case], table: list[tuple[str, bool]]) -> tuple[list[str], list[str]]:
-    """Rows of the rates and of the differences between the engines; goals go to ``table``."""
-    rates, errors = [], []
+def of_programs(cases: Iterable[Case], table: list[tuple[str, bool]]) -> list[str]:
+    """Rows of the rates; goals go to ``table``."""
+    rates = []
     for case in cases:
-        each, by_column = both(case)
-        for engine, rate in each.items():
-            if case.name == "boat, five axes":
-                table.append(row(f"{case.name}, by {engine}", BOAT[engine], rate, "/s", True))
-            elif case.name == "bear" and engine == "layers":
-                table.append(row("bear, by layers", BEAR, rate, "/s", True))
-        found = " | ".join(f"{each[e]:,.0f}" for e in ("moves", "layers"))
-        rates.append(f"| {case.name} | {case.kind} | {len(case.program)} | {found} |")
-        for column, values in by_column.items():
-            errors.append(f"| {case.name} | {case.kind} | {column} | " + " | ".join(f"{v:.2f}" for v in values) + " |")
-    return rates, errors
+        found = rate_of(case)
+        if case.name == "boat, five axes":
+            table.append(row(case.name, BOAT, found, "/s", True))
+        rates.append(f"| {case.name} | {case.kind} | {len(case.program)} | {found:,.0f} |")
+    return rates
 
 
 def main() -> None:
@@ -246,7 +232,7 @@ def main() -> None:
         table.append(row(f"{name}, sum of the chips", VOLUME, max(100.0 * total, 1e-4), "%", False))
     cases: list[Iterable[Case]] = [of_others(args.real)] if args.real else []
     cases += [of_examples(args.planned, args.real)] if args.real and args.planned else []
-    rates, differences = of_programs(itertools.chain(*cases), table)
+    rates = of_programs(itertools.chain(*cases), table)
     peer = beside_pathsim(args.moves) if args.real else None
     if peer is not None:
         table.append(row("finishing with loads over PathSim without", PEER, peer[0], "times", False))
@@ -258,12 +244,11 @@ def main() -> None:
     p = "p50 [%] | p95 [%] | p99 [%] |"
     parts = [
         tabled("", "| work | goal | measured | share of the goal | |", [line for line, _ in table]),
-        tabled("Moves a second of the moves engine:", "| program | contact | with loads | with their error |", alone),
+        tabled("Moves a second:", "| program | contact | with loads | with their error |", alone),
         tabled("Error of a move against slices eight times as many:", f"| program | column | {p}", errors),
-        tabled("Steps a second of other programs:", "| program | cutter | rows | moves | layers |", rates),
-        tabled("What layers differ by from moves in a step:", f"| program | cutter | column | {p}", differences),
+        tabled("Steps a second of other programs:", "| program | cutter | rows | steps a second |", rates),
     ]
-    text = "\n\n".join(parts[: 5 if rates else 3])
+    text = "\n\n".join(parts[: 4 if rates else 3])
     print(text)
     if args.write:
         written(text)

@@ -76,16 +76,16 @@ def one(moves: int, memory: bool) -> dict[str, float]:
     """Run one length."""
     material = material_named("al7075-t6")
     small = finishing(40)
-    remove(small, block(small), {1: BALL}, material, RESOLUTION, engine="layers")
+    remove(small, block(small), {1: BALL}, material, RESOLUTION)
     program = finishing(moves)
     stock = block(program)
     before = peak()
     wall, own = time.perf_counter(), time.process_time()
     with tempfile.TemporaryDirectory() as folder, Checkpoint(Path(folder) / "unfinished") as kept:
         if memory:
-            removal = remove(program, stock, {1: BALL}, material, RESOLUTION, engine="layers")
+            removal = remove(program, stock, {1: BALL}, material, RESOLUTION)
         else:
-            removal = remove_in_chunks(program, stock, {1: BALL}, material, RESOLUTION, kept, engine="layers")
+            removal = remove_in_chunks(program, stock, {1: BALL}, material, RESOLUTION, kept)
         wall, own = time.perf_counter() - wall, time.process_time() - own
         after = peak()
         force = float(removal.columns["force_n"].max())
@@ -137,7 +137,7 @@ def cost_of_teeth() -> int:
                 user.chips_of_teeth = (lambda front, _: front) if first and alike else exact
             surfaces.SHARE = 1e9 if first and not alike else share
             begin = time.process_time()
-            remove(program, block(program), {1: mill}, material, RESOLUTION, engine="moves", accuracy=False)
+            remove(program, block(program), {1: mill}, material, RESOLUTION, accuracy=False)
             if turn > 1:
                 times.append(time.process_time() - begin)
         # each pair ran in one go, so that other work on the machine slows both

@@ -97,14 +97,13 @@ def program_of(places: Floats) -> Program:
     )  # fmt: skip
 
 
-def layers(places: Floats, low: Floats, high: Floats, ball: Cutter, layer: float) -> tuple[float, float]:
+def with_forces(places: Floats, low: Floats, high: Floats, ball: Cutter, layer: float) -> tuple[float, float]:
     """Processor seconds and removed volume [mm^3]."""
     stock = LayeredStock.block(low, high, layer, 4.0 * ball.diameter)
     begun = time.process_time()
     done = remove(
         program_of(places), stock, {1: ball}, material_named("al7075-t6"),
         Resolution(1000.0, 0.01, 12, 0.5 * ball.radius),
-        engine="layers",
     )  # fmt: skip
     return time.process_time() - begun, done.volume_before - done.volume_after
 
@@ -164,14 +163,14 @@ def main() -> None:
     low = np.array(said.low)
     ball = Cutter(said.ball, 2, math.radians(30.0), 25.0, 40.0, 580e3, 0.5 * said.ball)
     moves = len(places) - 1
-    layers(places[:20], low, high, ball, said.layer)  # compiles
+    with_forces(places[:20], low, high, ball, said.layer)  # compiles
     dexels(places[:20], low, high, ball, said.pitch)
     print(f"{moves} moves, ball {said.ball:g} mm, layers {said.layer:g} mm, pitch {said.pitch:g} mm")
     base: float | None = None
     for name, done in (
         ("FreeCAD PathSim, geometry", freecad(places, low, high, ball, said.pitch)),
         ("dexels, geometry", dexels(places, low, high, ball, said.pitch)),
-        ("layers, chips and forces", layers(places, low, high, ball, said.layer)),
+        ("moves, chips and forces", with_forces(places, low, high, ball, said.layer)),
     ):
         if done is None:
             print(f"{name:28s} left out: there is none here")

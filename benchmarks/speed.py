@@ -184,7 +184,7 @@ def kernel(name: str, moves: int, workers: int = 1) -> float:
     stock = LayeredStock.block(case.low, case.high, 4.0 * case.layer_mm, 40.0)
     begun = time.process_time()
     remove(
-        case.program, stock, case.cutters, ALLOY, fine, engine="moves", accuracy=False, outlines=False,
+        case.program, stock, case.cutters, ALLOY, fine, accuracy=False, outlines=False,
         workers=workers,
     )  # fmt: skip
     return time.process_time() - begun

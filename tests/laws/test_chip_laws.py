@@ -25,19 +25,17 @@ from chipload.cutting.force import forces_over_turn
 from chipload.cutting.material import Material, material_named
 from chipload.engagement.chips.covered import covered_areas
 from chipload.engagement.chips.move import Move
-from chipload.engagement.immersion.immersion import Section, engagement_rows, tool_frame
-from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.engagement.tooth_engagement import ToothEngagement, tool_frame
 from chipload.geometry.contour import Contour
 from chipload.machine.machine import machine_named
 from chipload.planning.contour.plan import Finishing, plan_contour
-from chipload.simulation.chips import remove
 from chipload.simulation.removal import Resolution
-from chipload.stock.areas import PlaneAreas
 from chipload.stock.dexel import TriDexel
 from chipload.stock.layers import LayeredStock
-from chipload.stock.tile_rings import Taken, TileRings
 from engagement.tooth_paths import Cut
 from engagement.tooth_paths import loads as tooth_loads
+from layer_oracle.immersion import edges_under, engagement_rows
+from layer_oracle.removal import remove_by_layers
 from simulation.test_steps import five_axis
 
 Floats = NDArray[np.float64]
@@ -57,52 +55,26 @@ def walk(seed: int, moves: int = 7) -> tuple[Floats, Floats]:
     return tips, axes / np.linalg.norm(axes, axis=1)[:, None]
 
 
-class Kept:
-    """Writes down what every layer of a stock loses, and keeps its edges as they are cut."""
-
-    def __init__(self, stock: LayeredStock, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.lost = np.zeros(stock.layers)
-        self.asked: list[list[shapely.Geometry]] = [[] for _ in range(stock.layers)]
-        own = TileRings.remove
-
-        def removed(tiles: TileRings, layers: Any, shape: Any, areas: PlaneAreas, film: float, tidy: float) -> Taken:
-            if tiles.stock is not stock:
-                return own(tiles, layers, shape, areas, film, tidy)
-            taken = own(tiles, layers, shape, areas, film, 0.0)
-            for i, k, area in zip(layers.tolist(), shape.tolist(), taken.area.tolist(), strict=True):
-                self.lost[i] += area
-                self.asked[i].append(areas.polygon(k))
-            return taken
-
-        monkeypatch.setattr(TileRings, "remove", removed)
-
-
 @pytest.mark.parametrize(("cutter", "seed"), [(FLAT, 1), (BULL, 2), (BALL, 3)], ids=["flat", "bull", "ball"])
-def test_the_sum_of_chips_is_what_the_stock_has_lost(
-    cutter: Cutter, seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_sum_of_chips_is_what_the_stock_has_lost(cutter: Cutter, seed: int) -> None:
     """On every layer to 1e-9; and what is left is the block less the union of all that was covered, in one step."""
     resolution = Resolution(3.0, 1e-2, 4, 2.0)
     stock = LayeredStock.block(LOW, HIGH, 0.5, 15.0)
     program = five_axis(*(v.tolist() for v in walk(seed)))
-    with monkeypatch.context() as patched:
-        kept = Kept(stock, patched)
-        removal = remove(program, stock, {1: cutter}, NO_EDGE, resolution, engine="layers")
-    whole = 30.0 * 24.0
+    taken, asked = np.zeros(stock.layers), [list[shapely.Geometry]() for _ in range(stock.layers)]
+
+    def took(step: int, layer: int, area: shapely.Geometry, pieces: list[shapely.Polygon]) -> None:
+        taken[layer] += sum(p.area for p in pieces)
+        asked[layer].append(area)
+
+    removal = remove_by_layers(program, stock, {1: cutter}, NO_EDGE, resolution, took=took)
     left = np.array([stock.area(i) for i in range(stock.layers)])
-    assert (kept.lost > 10.0).sum() >= 8
-    np.testing.assert_allclose(kept.lost, whole - left, rtol=1e-9, atol=1e-9)
-    for i, shapes in enumerate(kept.asked):
+    assert (taken > 10.0).sum() >= 8
+    np.testing.assert_allclose(taken, 30.0 * 24.0 - left, rtol=1e-9, atol=1e-9)
+    for i, shapes in enumerate(asked):
         at_once = shapely.box(*LOW[:2], *HIGH[:2]).difference(shapely.union_all(shapes)).area
         assert left[i] == pytest.approx(at_once, rel=1e-9)
-    assert removal.columns["chip_volume_mm3"].sum() == pytest.approx(0.5 * kept.lost.sum(), rel=1e-9)
-    # with edges made simpler on the way, what that takes and gives is in the books too
-    tidied = remove(
-        program, LayeredStock.block(LOW, HIGH, 0.5, 15.0), {1: cutter}, NO_EDGE, resolution, engine="layers"
-    )
-    lost = tidied.volume_before - tidied.volume_after
-    assert tidied.columns["chip_volume_mm3"].sum() == pytest.approx(lost, rel=1e-9)
-    assert lost == pytest.approx(0.5 * kept.lost.sum(), rel=2e-3)
+    assert removal.columns["chip_volume_mm3"].sum() == pytest.approx(0.5 * taken.sum(), rel=1e-9)
 
 
 def solid(cutter: Cutter, tip: Floats, axis: Floats, sides: int, pieces: int) -> manifold3d.Manifold:
@@ -256,7 +228,7 @@ def slot(
     tip = np.array([0.0, 0.0, arm - depth]) - arm * axis
     stock = LayeredStock.block((-15.0, -12.0, -5.0), (15.0, 12.0, 0.0), layer, 30.0)
     program = five_axis([[tip[0] + x, tip[1], tip[2]] for x in (-10.0, 0.0, 0.5)], [axis.tolist()] * 3, feed=feed)
-    c = remove(program, stock, {1: cutter}, edge_with_feed(feed), resolution, engine="layers").columns
+    c = remove_by_layers(program, stock, {1: cutter}, edge_with_feed(feed), resolution).columns
     return np.array([c[name][-1] for name in (*FORCES, "torque_mean_nm")]), -float(tip[2])
 
 
@@ -311,7 +283,7 @@ def test_upright_the_chip_is_the_feed_times_the_sine() -> None:
     shape = covered_areas(Move.lerp([-30, 0, -depth], [0, 0, 1], [0, 0, -depth], [0, 0, 1]), FLAT, [-1.0], 1e-5)[0]
     assert shape is not None
     stock.remove_many(range(4, 10), [shape.polygon] * 6)
-    section = Section(*stock.edges(range(stock.layers), (-5.2, -5.2), (5.2, 5.2)))
+    section = edges_under(stock, range(stock.layers), (-5.2, -5.2), (5.2, 5.2))
     frame = tool_frame((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
     rows, owner = engagement_rows((0.1, 0.0, -depth), frame, (f_z, 0.0, 0.0), (0.0, 0.0, 0.0), slices(FLAT), section)
     assert (rows[:, 4:] == [f_z, 0.0, 0.0]).all()
@@ -349,7 +321,7 @@ def test_exact_arcs_and_chips_tell_the_same_force_of_a_finish_pass() -> None:
     x0, y0, x1, y1 = before.bounds
     stock = LayeredStock.block((x0, y0, -5.0), (x1, y1, 0.0), 5.0, 20.0)
     stock.remove(0, shapely.box(x0, y0, x1, y1).difference(before))
-    removal = remove(plan.program, stock, {1: FLAT}, al, Resolution(0.5, 1e-4, 1, 5.0), engine="layers")
+    removal = remove_by_layers(plan.program, stock, {1: FLAT}, al, Resolution(0.5, 1e-4, 1, 5.0))
     c, told = removal.columns, plan.history
     ours, theirs = c["label"] == removal.labels.index("finish"), told["pass"] == "finish"
     s = (c["s_mm"] - 0.5 * np.diff(c["s_mm"], prepend=0.0))[ours]

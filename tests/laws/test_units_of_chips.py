@@ -28,7 +28,7 @@ def run(tips: Floats, axes: Floats, cutter: Cutter, stock: LayeredStock, k: floa
     material = replace(material_named("al7075-t6"), source="scaled")
     material = replace(material, Kte=k * material.Kte, Kre=k * material.Kre, Kae=k * material.Kae)
     program = five_axis((k * tips).tolist(), axes.tolist(), feed=20.0 * k)
-    return remove(program, stock, {1: cutter}, material, Resolution(3.0 * k, 2e-3 * k, 8, 1.0 * k), engine="layers")
+    return remove(program, stock, {1: cutter}, material, Resolution(3.0 * k, 2e-3 * k, 8, 1.0 * k))
 
 
 @pytest.mark.parametrize(("cutter", "seed"), [(FLAT, 11), (BALL, 12)], ids=["flat", "ball"])
@@ -43,7 +43,7 @@ def test_a_rigid_motion_leaves_volumes_and_turns_forces(cutter: Cutter, seed: in
     two = run(tips @ turn.T + shift, axes @ turn.T, cutter, LayeredStock.of_mesh(mesh, 0.5, 15.0))
     a, b = one.columns, two.columns
     force, turned = (np.column_stack([c[name] for name in FORCES]) for c in (a, b))
-    np.testing.assert_allclose(b["chip_volume_mm3"], a["chip_volume_mm3"], atol=1e-4 * a["chip_volume_mm3"].max())
+    np.testing.assert_allclose(b["chip_volume_mm3"], a["chip_volume_mm3"], atol=2e-4 * a["chip_volume_mm3"].max())
     assert b["chip_volume_mm3"].sum() == pytest.approx(a["chip_volume_mm3"].sum(), rel=5e-5)
     np.testing.assert_allclose(turned, force @ turn.T, atol=3e-4 * np.abs(force).max())
     np.testing.assert_allclose(b["torque_mean_nm"], a["torque_mean_nm"], atol=1e-3 * a["torque_mean_nm"].max())

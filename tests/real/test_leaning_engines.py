@@ -20,6 +20,7 @@ from chipload.program.read import read_program
 from chipload.simulation.chips import remove
 from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
+from layer_oracle.removal import remove_by_layers
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data")) / "nc"
 BOAT = DATA / "linuxcnc_5axis" / "boat-xyzac.ngc"
@@ -44,14 +45,11 @@ def rows(program: Program, first: int, count: int) -> Program:
 def by_both(
     program: Program, cutter: Cutter, low: tuple[float, ...], high: tuple[float, ...]
 ) -> tuple[Removal, Removal]:
-    """By ``auto``, and by layers of 0.1 mm."""
-    out = []
-    for engine, layer in (("moves", 0.5), ("layers", 0.1)):
-        slices = 24 if engine == "moves" else 48
-        fine = Resolution(2.0, 0.002, slices, 0.1 * cutter.radius, bottom_slices=12)
-        stock = LayeredStock.block(low, high, layer, 4.0 * cutter.radius)
-        out.append(remove(program, stock, {1: cutter}, ALLOY, fine, engine=engine, accuracy=False))  # type: ignore[arg-type]
-    return out[0], out[1]
+    """By moves, and by layers of 0.1 mm."""
+    fine = Resolution(2.0, 0.002, 24, 0.1 * cutter.radius, bottom_slices=12)
+    moves, layers = (LayeredStock.block(low, high, layer, 4.0 * cutter.radius) for layer in (0.5, 0.1))
+    one = remove(program, moves, {1: cutter}, ALLOY, fine, accuracy=False)
+    return one, remove_by_layers(program, layers, {1: cutter}, ALLOY, replace(fine, corner_slices=48))
 
 
 def held(moves: Removal, layers: Removal, volume: float, force: float, first: int = 0) -> NDArray[np.bool_]:

@@ -40,9 +40,7 @@ def wave(rows: int) -> Program:
 def loads(slices: int) -> dict[str, NDArray[np.float64]]:
     stock = LayeredStock.block((-6.0, -6.0, -8.0), (APART * ROW + 6.0, 12.0, 0.0), 2.0, 32.0)
     fine = Resolution(step_mm=3.0, tolerance=0.05, corner_slices=slices, flank_mm=48.0 / slices)
-    removal = remove(
-        wave(8), stock, {1: BALL}, material_named("al7075-t6"), fine, engine="moves", accuracy=False, workers=1
-    )
+    removal = remove(wave(8), stock, {1: BALL}, material_named("al7075-t6"), fine, accuracy=False, workers=1)
     return {name: np.asarray(removal.columns[name]) for name in ("force_n", "torque_mean_nm")}
 
 
@@ -67,8 +65,6 @@ def test_a_corner_beside_a_cone() -> None:
     for slices in (12, 96):
         stock = LayeredStock.block((0.0, -2.985, -5.0), (30.0, 30.0, 0.0), 2.0, 32.0)
         fine = Resolution(step_mm=2.0, tolerance=0.05, corner_slices=slices, flank_mm=48.0 / slices)
-        removal = remove(
-            program, stock, {1: taper}, material_named("al7075-t6"), fine, engine="moves", accuracy=False, workers=1
-        )
+        removal = remove(program, stock, {1: taper}, material_named("al7075-t6"), fine, accuracy=False, workers=1)
         forces.append(float(np.max(removal.columns["force_n"])))
     assert forces[0] == pytest.approx(forces[1], rel=0.02)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -15,10 +16,10 @@ from chipload.simulation import _form_error
 from chipload.simulation.chips import remove
 from chipload.simulation.clearance.body import cutting_part
 from chipload.simulation.deflection import _shape
-from chipload.simulation.moves import Engine
-from chipload.simulation.removal import Resolution
+from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.dexel import TriDexel
 from chipload.stock.layers import LayeredStock
+from layer_oracle.removal import remove_by_layers
 from simulation.discs import mean_loads_of_discs
 from simulation.test_steps import five_axis
 
@@ -27,7 +28,7 @@ CONE = Cutter(8.0, 4, 0.4, 20.0, 50.0, 6e5, corner_radius=1.5, barrel_radius=250
 LENS = Cutter(10.0, 2, 0.3, 16.0, 50.0, 6e5, corner_e=2.0, barrel_radius=25.0)
 BARRELS = {"tangential": OVAL, "conical": CONE, "sharp": LENS}
 #: every form by moves, one by layers too
-RUNS = [*((name, "moves") for name in BARRELS), ("tangential", "layers")]
+RUNS = [*((name, remove) for name in BARRELS), ("tangential", remove_by_layers)]
 PLAIN = Material("plain", 800.0, 250.0, 150.0, 12.0, 9.0, 4.0, source="made up")
 ENERGY = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this test")
 FINE = Resolution(step_mm=2.0, tolerance=1e-4, corner_slices=40, flank_mm=0.25)
@@ -58,23 +59,23 @@ def test_the_profile_is_tangent_and_its_arc_has_the_radius(name: str) -> None:
     assert above[0] == pytest.approx(cutter.radius + arc.z_to * math.tan(cutter.taper), rel=1e-12)
 
 
-@pytest.mark.parametrize(("name", "engine"), RUNS)
-def test_a_wall_takes_the_volume_under_the_profile(name: str, engine: Engine) -> None:
+@pytest.mark.parametrize(("name", "by"), RUNS)
+def test_a_wall_takes_the_volume_under_the_profile(name: str, by: Callable[..., Removal]) -> None:
     cutter, stock = BARRELS[name], wall()
-    removal = remove(along(cutter), stock, {1: cutter}, PLAIN, FINE, accuracy=False, engine=engine)
+    removal = by(along(cutter), stock, {1: cutter}, PLAIN, FINE)
     z = (np.arange(40_000) + 0.5) * (DEEP / 40_000)
     area = np.maximum(cutter.radius_at(z) - REST, 0.0).mean() * DEEP
     assert area > 0.2
     assert removal.columns["chip_volume_mm3"].sum() == pytest.approx(30.0 * area, rel=2e-3)
     lost = removal.volume_before - removal.volume_after
-    assert lost == pytest.approx(removal.columns["chip_volume_mm3"].sum(), rel=1e-9 if engine == "layers" else 2e-3)
+    assert lost == pytest.approx(removal.columns["chip_volume_mm3"].sum(), rel=1e-9 if by is remove_by_layers else 2e-3)
 
 
-@pytest.mark.parametrize(("name", "engine"), RUNS)
-def test_forces_are_those_of_a_fine_stack_of_discs(name: str, engine: Engine) -> None:
+@pytest.mark.parametrize(("name", "by"), RUNS)
+def test_forces_are_those_of_a_fine_stack_of_discs(name: str, by: Callable[..., Removal]) -> None:
     """The feed is so small that the teeth run on circles: chips between their true paths begin f / (2 rho) later."""
     cutter, feed = BARRELS[name], 1.0
-    found = remove(along(cutter, feed=feed), wall(), {1: cutter}, PLAIN, FINE, accuracy=False, engine=engine).columns
+    found = by(along(cutter, feed=feed), wall(), {1: cutter}, PLAIN, FINE).columns
     k = int(np.flatnonzero(np.abs(found["x_mm"] - 15.0) < 1.1)[0])
     expected = mean_loads_of_discs(cutter.radius_at(np.linspace(0.0, DEEP, 4001)), DEEP, REST, cutter, feed, PLAIN)
     for key, value in expected.items():
@@ -83,17 +84,17 @@ def test_forces_are_those_of_a_fine_stack_of_discs(name: str, engine: Engine) ->
 
 
 def test_the_torque_does_the_work_that_the_volume_asks_for() -> None:
-    found = remove(along(OVAL), wall(), {1: OVAL}, ENERGY, FINE, accuracy=True, engine="layers")
+    found = remove(along(OVAL), wall(), {1: OVAL}, ENERGY, FINE)
     work = found.columns["cutting_work_j"].sum()
     assert work == pytest.approx(ENERGY.Ktc * found.columns["chip_volume_mm3"].sum() / 1000.0, rel=0.02)
 
 
-@pytest.mark.parametrize(("name", "engine"), RUNS)
-def test_a_leaning_barrel_takes_what_dexels_lose(name: str, engine: Engine) -> None:
+@pytest.mark.parametrize(("name", "by"), RUNS)
+def test_a_leaning_barrel_takes_what_dexels_lose(name: str, by: Callable[..., Removal]) -> None:
     cutter = BARRELS[name]
     tips, axes = [[-6.0, 2.0, -4.0], [36.0, 1.0, -5.0]], [[0.1, 0.45, 1.0], [-0.2, 0.3, 1.0]]
     stock = LayeredStock.block((0.0, -20.0, -12.0), (30.0, 10.0, 0.0), 0.15, 30.0)
-    found = remove(five_axis(tips, axes), stock, {1: cutter}, PLAIN, FINE, accuracy=False, engine=engine)
+    found = by(five_axis(tips, axes), stock, {1: cutter}, PLAIN, FINE)
     dexels = TriDexel.block((0.0, -20.0, -12.0), (30.0, 10.0, 0.0), 0.2)
     a0, a1 = (np.array(a) / np.linalg.norm(a) for a in axes)
     dexels.remove_move(tips[0], a0, tips[1], a1, cutter.outline, error_mm=2e-3)

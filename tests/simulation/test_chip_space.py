@@ -16,6 +16,7 @@ from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.chips import remove
 from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
+from layer_oracle.removal import remove_by_layers
 
 AL = material_named("al7075-t6")
 MILL = Cutter(10.0, 3, math.radians(30.0), 20.0, 30.0, 6e5, gullet=10.0, chip_ratio=5.0)
@@ -28,14 +29,8 @@ def fill(cutter: Cutter, width: float, depth: float) -> tuple[float, float]:
     stock = LayeredStock.block((0.0, -20.0, -8.0), (40.0, width - 5.0, 0.0), 0.25, 20.0)
     path = [rapid([-10.0, 0.0, -depth], SPEED, 1, "link"), plunge([30.0, 0.0, -depth], FEED, SPEED, 1, "cut")]
     fine = Resolution(2.0, 1e-4, 60, 0.5)
-    done = remove(
-        Program.join(path),
-        stock,
-        {1: cutter},
-        AL,
-        fine,
-        watch=lambda cuts: {"flute_fill": flute_fill(cuts)},
-        engine="layers",
+    done = remove_by_layers(
+        Program.join(path), stock, {1: cutter}, AL, fine, watch=lambda cuts: {"flute_fill": flute_fill(cuts)}
     )
     x, share = done.columns["x_mm"], done.columns["flute_fill"]
     return float(share.max()), float(share[np.argmin(np.abs(x - 15.0))])
@@ -70,7 +65,12 @@ def test_a_plunge_of_a_flat_end_is_not_judged() -> None:
     path = [rapid([0.0, 0.0, 1.0], SPEED, 1, "link"), plunge([0.0, 0.0, -0.4], 2.0, SPEED, 1, "cut")]
     fine = Resolution(2.0, 1e-4, 4, 0.5)
     done = remove(
-        Program.join(path), stock, {1: MILL}, AL, fine, watch=lambda c: {"flute_fill": flute_fill(c)}, engine="layers"
+        Program.join(path),
+        stock,
+        {1: MILL},
+        AL,
+        fine,
+        watch=lambda c: {"flute_fill": flute_fill(c)},
     )
     assert done.columns["chip_volume_mm3"].sum() > 0.0
     assert not done.columns["flute_fill"].any()

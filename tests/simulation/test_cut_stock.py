@@ -154,8 +154,6 @@ def test_a_stock_whose_layers_were_cut_otherwise_forgets_its_moves() -> None:
     assert stock.earlier is None
     stock.restore(state)
     assert stock.earlier is not None
-    remove(path([[-8.0, 14.0, -4.0], [20.0, 14.0, -4.0]]), stock, CUTTERS, ALLOY, FINE, engine="layers", accuracy=False)
-    assert stock.earlier is None
 
 
 def test_the_exposed_faces_hold_what_the_layers_hold() -> None:

@@ -12,10 +12,10 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.chips import remove
 from chipload.simulation.loads import Cuts, at_feeds, greatest_loads, join_cuts
 from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
+from layer_oracle.removal import remove_by_layers
 
 FINE = Resolution(step_mm=2.0, tolerance=1e-3, corner_slices=12, flank_mm=1.0)
 STEEL = Material(
@@ -38,7 +38,7 @@ def test_other_feeds_cost_what_the_simulation_at_them_says(material, runout, rad
 
     def run(feed, watch=None):
         stock = LayeredStock.block((0.0, -6.0, -5.0), (30.0, 24.0, 0.0), 1.0, 20.0)
-        return remove(path(feed), stock, {1: cutter}, material, FINE, watch=watch, engine="layers").columns
+        return remove_by_layers(path(feed), stock, {1: cutter}, material, FINE, watch=watch).columns
 
     factors = (0.3, 1.0, 2.5)
     names = ("force_n", "torque_nm", "power_w", "chip_max_mm")
@@ -62,8 +62,8 @@ def test_each_step_has_its_own_factor_and_cuts_join() -> None:
     cutter = Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5, runout=(0.004, 0.2))
     blocks: list[Cuts] = []
     stock = LayeredStock.block((0.0, -6.0, -5.0), (30.0, 24.0, 0.0), 1.0, 20.0)
-    removal = remove(
-        path(10.0), stock, {1: cutter}, PLAIN, FINE, keep=True, watch=lambda c: blocks.append(c) or {}, engine="layers"
+    removal = remove_by_layers(
+        path(10.0), stock, {1: cutter}, PLAIN, FINE, keep=True, watch=lambda c: blocks.append(c) or {}
     )
     (whole,) = removal.cuts
     assert len(whole) == sum(len(b) for b in blocks)

@@ -27,13 +27,13 @@ from chipload.simulation.loads import (
     BANDS,
     LOADS,
     Cuts,
-    StepEngagement,
     greatest_loads,
-    loads_of_steps,
     over_turn,
 )
 from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
+from layer_oracle.loads import StepEngagement, loads_of_steps
+from layer_oracle.removal import remove_by_layers
 
 Floats = NDArray[np.float64]
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
@@ -67,9 +67,12 @@ def zigzag() -> Program:
     return Program.join([one, rapid([20.0, 20.0, 9.0], 300.0, 1, "link"), path(wave, 2)])
 
 
-def run(program: Program, engine: str = "moves", stock: LayeredStock | None = None, **more: Any) -> Removal:
-    cutters = {1: MILL, 2: BALL}
-    return remove(program, stock or block(), cutters, ALLOY, FINE, engine=engine, **more)  # type: ignore[arg-type]
+def run(program: Program, stock: LayeredStock | None = None, **more: Any) -> Removal:
+    return remove(program, stock or block(), {1: MILL, 2: BALL}, ALLOY, FINE, **more)
+
+
+def run_by_layers(program: Program, stock: LayeredStock | None = None, **more: Any) -> Removal:
+    return remove_by_layers(program, stock or block(), {1: MILL, 2: BALL}, ALLOY, FINE, **more)
 
 
 def test_a_slot_costs_what_the_straight_flank_costs() -> None:
@@ -91,7 +94,7 @@ def test_a_slot_costs_what_the_straight_flank_costs() -> None:
 def test_both_engines_agree_on_a_straight_flank(speed: float) -> None:
     """A side cut of 2 mm by a flat mill, on which the layers are exact."""
     program = path([[-8.0, -3.0, -4.0], [30.0, -3.0, -4.0]], speed=speed)
-    one, two = run(program).columns, run(program, "layers").columns
+    one, two = run(program).columns, run_by_layers(program).columns
     k = slice(20, 36)
     for name in two:
         scale = np.abs(two[name][k]).max() if two[name].dtype.kind == "f" else 1.0
@@ -101,7 +104,7 @@ def test_both_engines_agree_on_a_straight_flank(speed: float) -> None:
 def test_work_of_the_torque_is_ktc_times_the_volume_that_the_stock_lost() -> None:
     plain = Material("plain", 900.0, 300.0, 100.0, 0.0, 0.0, 0.0, source="made up")
     stock = block(0.02)
-    removal = remove(zigzag(), stock, {1: MILL, 2: BALL}, plain, FINE, engine="moves")
+    removal = remove(zigzag(), stock, {1: MILL, 2: BALL}, plain, FINE)
     work = 1e3 * removal.columns["cutting_work_j"].sum()
     lost = removal.volume_before - removal.volume_after
     assert removal.volume_before == pytest.approx(40.0 * 30.0 * 8.0)
@@ -135,13 +138,6 @@ def leaning() -> Program:
     axis = np.array(program.axis)
     axis[1] = (0.1, 0.0, math.sqrt(0.99))
     return replace(program, axis=axis)
-
-
-def test_auto_takes_moves_where_the_axis_leans() -> None:
-    one, two = run(leaning(), "auto"), run(leaning(), "moves")
-    assert one.findings == two.findings == ()
-    for name in two.columns:
-        np.testing.assert_array_equal(one.columns[name], two.columns[name])
 
 
 def test_a_shank_stands_in_what_is_above_the_flutes() -> None:
@@ -185,7 +181,7 @@ def test_a_mesh_is_cut_as_its_box() -> None:
 def test_the_layers_that_are_left_are_those_of_the_layered_engine() -> None:
     one, two = block(), block()
     run(zigzag(), stock=one)
-    run(zigzag(), "layers", two)
+    run_by_layers(zigzag(), two)
     for a, b in zip(one.volumes(), two.volumes(), strict=True):
         assert a == pytest.approx(b, abs=2e-3 * 40.0 * 30.0 * 0.5)
     for i in range(0, one.layers, 3):
@@ -292,7 +288,7 @@ def test_a_watch_gets_the_instant_of_the_greatest_force() -> None:
     """Steps of 4 mm of a cutter of 8 mm, looked at five times, into a wall whose depth rises."""
     program = path([[-4.0, 15.0, -0.5], [44.0, 15.0, -4.0]], tool=2)
     fine = replace(FINE, step_mm=4.0)
-    removal = remove(program, block(), {2: BALL}, ALLOY, fine, engine="moves", keep=True)
+    removal = remove(program, block(), {2: BALL}, ALLOY, fine, keep=True)
     cuts = removal.cuts[0]
     loads = greatest_loads(cuts, ALLOY, FINE.rotation)
     for name in ("force_n", "torque_nm"):
@@ -303,7 +299,7 @@ def test_a_watch_gets_the_instant_of_the_greatest_force() -> None:
 def test_a_step_that_cuts_unlike_the_one_before_it_is_looked_at_three_times(monkeypatch: pytest.MonkeyPatch) -> None:
     """A mill of 10 mm enters a block at right angles in steps of 1 mm: against steps of 0.02 mm."""
     program = path([[-6.0, 15.0, -3.0], [9.0, 15.0, -3.0]])
-    fine = remove(program, block(), {1: MILL}, ALLOY, replace(FINE, step_mm=0.02), engine="moves", accuracy=False)
+    fine = remove(program, block(), {1: MILL}, ALLOY, replace(FINE, step_mm=0.02), accuracy=False)
     known = fine.columns["chip_volume_mm3"].reshape(15, 50).sum(axis=1)
     some = run(program, accuracy=False).columns["chip_volume_mm3"]
     monkeypatch.setattr("chipload.engagement.moves.stock.MORE", (1, 1))
@@ -316,7 +312,7 @@ def test_a_wall_that_a_step_meets_at_its_very_end_is_found(monkeypatch: pytest.M
     """Square into a wall that stands 0.3 mm before the corner of the path: against steps of 0.02 mm."""
     program = path([[-8.0, -2.0, -3.0], [-4.7, -2.0, -3.0], [-4.7, 9.0, -3.0]])
     fine = replace(FINE, step_mm=0.02)
-    known = remove(program, block(), {1: MILL}, ALLOY, fine, engine="moves", accuracy=False).columns
+    known = remove(program, block(), {1: MILL}, ALLOY, fine, accuracy=False).columns
     first = known["y_mm"] <= -2.0
 
     def peak() -> float:
@@ -350,7 +346,7 @@ def test_accuracy_of_a_run() -> None:
 def test_times_on_the_machine_count() -> None:
     program = zigzag()
     times = np.linspace(0.1, 0.5, len(program))
-    found, known = run(program, times=times).columns, run(program, "layers", times=times).columns
+    found, known = run(program, times=times).columns, run_by_layers(program, times=times).columns
     for name in ("t_s", "duration_s", "seconds"):
         np.testing.assert_array_equal(found[name], known[name])
     assert found["t_s"][-1] == pytest.approx(times.sum())
@@ -360,7 +356,7 @@ def test_times_on_the_machine_count() -> None:
 def test_a_damaged_checkpoint_is_set_aside(tmp_path: Path, pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chipload.simulation.chips.BLOCK", 8)
     cutters, stock = {1: MILL, 2: BALL}, block()
-    known = all_bytes(remove(zigzag(), stock, cutters, ALLOY, FINE, engine="moves"), stock)
+    known = all_bytes(remove(zigzag(), stock, cutters, ALLOY, FINE), stock)
 
     def stop(done: float, what: str) -> None:
         if done > 0.5:

@@ -24,6 +24,7 @@ from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
 from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
+from layer_oracle.removal import remove_by_layers
 
 Floats = NDArray[np.float64]
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
@@ -47,9 +48,8 @@ def block(layer: float = 0.5) -> LayeredStock:
     return LayeredStock.block(LOW, HIGH, layer, 20.0)
 
 
-def run(program: Program, engine: str = "moves", stock: LayeredStock | None = None, **more: Any) -> Removal:
-    cutters = {1: MILL, 2: BALL}
-    return remove(program, stock or block(), cutters, ALLOY, FINE, engine=engine, **more)  # type: ignore[arg-type]
+def run(program: Program, stock: LayeredStock | None = None, **more: Any) -> Removal:
+    return remove(program, stock or block(), {1: MILL, 2: BALL}, ALLOY, FINE, **more)
 
 
 def waving(tool: int = 1) -> Program:
@@ -96,7 +96,7 @@ def test_work_of_the_torque_is_ktc_times_the_volume_that_the_stock_lost(tool: in
     quick = waving(tool)
     slow = replace(quick, feed=np.where(np.isfinite(quick.feed), quick.feed / 20.0, quick.feed))
     for program, name, factor in ((slow, "torque_mean_nm", 300.0), (quick, "cutting_work_j", 1.0)):
-        removal = remove(program, block(0.05), {1: MILL, 2: BALL}, plain, FINE, engine="moves", accuracy=False)
+        removal = remove(program, block(0.05), {1: MILL, 2: BALL}, plain, FINE, accuracy=False)
         columns, lost = removal.columns, removal.volume_before - removal.volume_after
         seconds = columns["seconds"] if name == "torque_mean_nm" else 1.0
         work = (1e3 * columns[name] * factor * seconds).sum()
@@ -109,7 +109,7 @@ def test_work_of_the_torque_is_ktc_times_the_volume_that_the_stock_lost(tool: in
 def test_work_of_the_torque_at_a_large_feed_is_within_the_stated_error(tool: int) -> None:
     """0.1 and 0.2 mm a tooth: Ktc times the volume, up to the error of the mean torque."""
     plain = Material("plain", 900.0, 300.0, 100.0, 0.0, 0.0, 0.0, source="made up")
-    removal = remove(waving(tool), block(0.05), {1: MILL, 2: BALL}, plain, FINE, engine="moves")
+    removal = remove(waving(tool), block(0.05), {1: MILL, 2: BALL}, plain, FINE)
     columns, lost = removal.columns, removal.volume_before - removal.volume_after
     work = (1e3 * columns["torque_mean_nm"] * 300.0 * columns["seconds"]).sum()
     assert abs(work / (900.0 * lost) - 1.0) < min(removal.resolution_error["torque_mean_nm"], 0.05)
@@ -119,7 +119,7 @@ def test_layers_find_the_same_loads() -> None:
     """Thin layers and many slices, in the steps of the first row, which are deep: in shallow ones layers are coarse."""
     fine = replace(FINE, corner_slices=48, bottom_slices=12, flank_mm=0.5)
     one = run(waving(), accuracy=False).columns
-    two = remove(waving(), block(0.1), {1: MILL}, ALLOY, fine, engine="layers", accuracy=False).columns
+    two = remove_by_layers(waving(), block(0.1), {1: MILL}, ALLOY, fine).columns
     k = np.arange(18, 40)
     for name, most in (("chip_volume_mm3", 0.005), ("force_n", 0.05), ("torque_nm", 0.05), ("torque_mean_nm", 0.04)):
         error = np.abs(one[name][k] / two[name][k] - 1.0)
@@ -140,7 +140,7 @@ def test_accuracy_of_a_run_with_a_turning_axis() -> None:
 
 
 def run_of_ball(ball: Cutter) -> Removal:
-    return remove(waving(2), block(), {2: ball}, ALLOY, FINE, engine="moves")
+    return remove(waving(2), block(), {2: ball}, ALLOY, FINE)
 
 
 def test_a_program_again_cuts_nothing() -> None:
@@ -156,7 +156,7 @@ def test_a_program_again_cuts_nothing() -> None:
 def test_a_run_that_was_stopped_gives_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chipload.simulation.chips.BLOCK", 2)
     stock = block()
-    known = remove(waving(), stock, {1: MILL}, ALLOY, FINE, engine="moves")
+    known = remove(waving(), stock, {1: MILL}, ALLOY, FINE)
 
     def stop(done: float, what: str) -> None:
         if done > 0.5:

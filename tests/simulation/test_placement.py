@@ -26,7 +26,13 @@ def simulated(low, high):
     program = Program.join([*parts, plunge([10.0, 0.0, 5.0], 10.0, 300.0, 1, "cut")])
     stock = LayeredStock.block(low, high, 1.0, 20.0)
     bounds = (np.array(low), np.array(high))
-    removal = remove(program, stock, {1: MILL}, material_named("al7075-t6"), FINE, engine="layers")
+    removal = remove(
+        program,
+        stock,
+        {1: MILL},
+        material_named("al7075-t6"),
+        FINE,
+    )
     return removal.columns, bounds
 
 

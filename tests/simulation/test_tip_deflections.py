@@ -44,7 +44,12 @@ def slot(cutter: Cutter = MILL, workpiece: StepCompliances | None = None, **stif
     stock = LayeredStock.block((0.0, -15.0, -5.0), (40.0, 15.0, 0.0), 1.0, 40.0)
     fine = Resolution(2.0, 1e-4, 1, 0.5)
     columns = remove(
-        program, stock, {1: cutter}, SOFT, fine, watch=deflection_watch(gives, SOFT), engine="layers"
+        program,
+        stock,
+        {1: cutter},
+        SOFT,
+        fine,
+        watch=deflection_watch(gives, SOFT),
     ).columns
     k = int(np.flatnonzero(columns["x_mm"] == 20.0)[0])
     return {name: float(v[k]) for name, v in columns.items() if name.startswith("deflection")}, columns, gives

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import struct
 
 import numpy as np
 import pytest
@@ -177,19 +175,6 @@ def test_nothing_left_is_an_empty_mesh() -> None:
     stock = LayeredStock.block((0.0, 0.0, 0.0), (8.0, 8.0, 1.0), 1.0, 100.0)
     stock.remove(0, shapely.box(0.0, 0.0, 8.0, 8.0))
     assert len(stock.mesh().faces) == 0
-    data = stock.to_glb()
-    kind, version, size, text, code = struct.unpack("<4sII I4s", data[:20])
-    assert (kind, version, size, text % 4, code) == (b"glTF", 2, len(data), 0, b"JSON")
-    assert json.loads(data[20:]) == {"asset": {"version": "2.0"}}
-
-
-def test_glb_is_in_metres_with_y_up() -> None:
-    stock = LayeredStock.block((10.0, 20.0, 30.0), (11.0, 22.0, 33.0), 1.0, 100.0)
-    data = stock.to_glb()
-    assert data == stock.to_glb()
-    scene = trimesh.load(trimesh.util.wrap_as_stream(data), file_type="glb")
-    assert scene.bounds == pytest.approx(np.array([[0.010, 0.030, -0.022], [0.011, 0.033, -0.020]]), rel=1e-6)
-    assert scene.to_mesh().volume == pytest.approx(6e-9, rel=1e-6)
 
 
 def sphere() -> trimesh.Trimesh:

@@ -10,20 +10,17 @@ if TYPE_CHECKING:
     from chipload.engagement.chips.covered import covered
     from chipload.engagement.chips.move import Move
     from chipload.engagement.contact import Engagement, StockBoundary
-    from chipload.engagement.immersion.immersion import Section, engagement_rows
     from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
     from chipload.engagement.tooth_surfaces import chips_of_teeth
 
 __all__ = [
     "Engagement",
     "Move",
-    "Section",
     "StockBoundary",
     "ToothEngagement",
     "chips_of_teeth",
     "covered",
     "engagement_of_arcs",
-    "engagement_rows",
 ]
 
 __getattr__, __dir__ = attach(
@@ -34,6 +31,5 @@ __getattr__, __dir__ = attach(
         "contact": "Engagement StockBoundary",
         "chips.move": "Move",
         "chips.covered": "covered",
-        "immersion.immersion": "Section engagement_rows",
     },
 )

@@ -239,3 +239,26 @@ def _check_cutter(cutter: Cutter, axial_depth: float) -> None:
             f"axial_depth_mm = {axial_depth:g}: must be above 0 and at most cutter.flute_length_mm = "
             f"{cutter.flute_length:g}"
         )
+
+
+def tool_frame(axis: ArrayLike, toward: ArrayLike, clockwise: bool = True) -> Floats:
+    """Return the tool frame (3, 3), rows T, n, A: T the direction ``toward`` (3,) across the unit axis (3,), n left of
+    it (right if the spindle turns counter-clockwise). Where ``toward`` is parallel to the axis, T is any direction
+    across it.
+
+    >>> tool_frame([0, 0, 1], [3, 0, 4]).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    ax, ay, az = np.asarray(axis, dtype=np.float64).tolist()
+    vx, vy, vz = np.asarray(toward, dtype=np.float64).tolist()
+    along = vx * ax + vy * ay + vz * az
+    tx, ty, tz = vx - along * ax, vy - along * ay, vz - along * az
+    size = math.sqrt(tx * tx + ty * ty + tz * tz)
+    if size <= 1e-12 * math.sqrt(vx * vx + vy * vy + vz * vz) or size == 0.0:
+        least = int(np.argmin(np.abs([ax, ay, az])))
+        tx, ty, tz = (float(i == least) - (ax, ay, az)[least] * a for i, a in enumerate((ax, ay, az)))
+        size = math.sqrt(tx * tx + ty * ty + tz * tz)
+    tx, ty, tz = tx / size, ty / size, tz / size
+    hand = 1.0 if clockwise else -1.0
+    n = [hand * (ay * tz - az * ty), hand * (az * tx - ax * tz), hand * (ax * ty - ay * tx)]
+    return np.array([[tx, ty, tz], n, [ax, ay, az]]) + 0.0

@@ -9,39 +9,28 @@ energy: Ktc of a material without size effect, else the mean of Ktc h^(-m) over 
 with which the loads were computed. A step that lost volume and has no engaged edge takes the mean K of its cutter. V
 and the engaged edge come from different computations.
 
-**Resolution error** of each column of loads, by layers: some steps are computed a second time, with a finer resolution,
-in a stock of their own. This stock is the initial stock in the box around the cutter. The thickness of its layers is a
-share of their height above the lowest point of the cutter, so that the shallowest cut has several layers. The earlier
-steps that reach into the box are removed from it. Then the step is divided into halves and computed with twice the
-slices (at least FINE, narrow near the bottom) and half the angle between rotations. With c the load of the run, f that
-of the finer run and w the worst load of the run, the error is
+**Resolution error** of each column of loads: some steps are computed a second time. The earlier steps that reach into
+the box around such a step are removed from the initial body. The step is computed with MORE times the slices and FINER
+times the rotations, once at the same instants and once in halves. With c the load of the run, f that at the same
+instants, g that in halves and w the worst load of the run, the error is
 
-    FACTOR max e / w + FLOOR + v / (1 - v),  e = |f - c| where c >= w / 2, else max(f - w, 0).
+    FACTOR max e / w + FLOOR + v / (1 - v),  e the greater of g - w and of |f - c| where c >= w / 2, else f - w.
 
-A small load matters to a limit only if the finer one exceeds the worst.
+A small load matters to a limit only if the finer one exceeds the worst. The contact is exact, so that a load that
+differs between the halves of a step, as where the cutter enters, is not an error of the resolution unless it exceeds
+every load of the run.
 
 * v is the share of the volume that was lost in films, for which no loads are computed.
-* FACTOR accounts for the error of the finer run itself. The errors of layers, slices and steps are at least of first
-  order, and the finer ones are at most half as large, which gives 2. If the axis leans, slices do not end where contact
-  ends and the instants of the peak are uneven: 3.
-* FLOOR, 1 % (2 % if an axis leans), is the error that both runs share: the sampled rotations, and edges of the stock
-  within the tolerance. Of barrel cutters, which meet a wall at a small angle, it is at least :data:`BARREL_FLOOR`.
+* FACTOR accounts for the error of the finer run itself, which is of first order: 2. If the axis leans, slices do not
+  end where contact ends and the instants of the peak are uneven: 3.
+* FLOOR is :data:`MOVES_FLOOR`: with twice the difference of the two resolutions and what the chips leave out it holds
+  the true loads of random cuts by all kinds of mills (benchmarks/truth.py, docs/design/engines.md). If all cutters have
+  a straight flank and a flat bottom, on which slices are exact, it is :data:`FLAT_FLOOR`; if an axis leans,
+  :data:`LEANING_MOVES_FLOOR`.
 
-The computed steps are: a worst one of each column; those that remove most; others at even distances among those in cut;
-some that remove nothing, at the height of a section, although the cutter is in the stock; and MISSED of those that
-remove more than is engaged at their middle, as where a mill meets a wall at the end of a step. The last kind is divided
-into PARTS instead of halves, since halves may miss it too. Their number is limited by the earlier steps that they need,
-at most SHARE of the steps of the run, and as many again for the last kind; the first kind and short programs are
-computed in any case.
-
-**Resolution error** by moves: the stock has no layers. The earlier steps that reach into the box are removed from the
-initial body. The step is computed with MORE times the slices and FINER times the rotations, once at the same
-instants, which gives f - c, and once in halves, which gives the loads above the worst. The contact is exact, so that a
-load that differs between the halves of a step, as where the cutter enters, is not an error of the resolution unless it
-exceeds every load of the run. FLOOR is :data:`MOVES_FLOOR`: with twice the difference of the two resolutions and what
-the chips leave out it holds the true loads of random cuts by all kinds of mills (benchmarks/truth.py,
-docs/design/engines.md). If all cutters have a straight flank and a flat bottom, on which slices
-are exact, it is :data:`FLAT_FLOOR`; if an axis leans, :data:`LEANING_MOVES_FLOOR`.
+The computed steps are: a worst one of each column; one that removes most; others at even distances among those in cut;
+some that remove nothing, although the cutter is in the stock. Their number is limited by the earlier steps that they
+need, at most SHARE of the steps of the run; the first kind and short programs are computed in any case.
 
 **Chip.** To each error what the chips between the paths of the teeth leave out is added, of the steps that are computed
 a second time and have at least half of the worst load: :func:`chipload.engagement.tooth_surfaces.chip_error`. The
@@ -61,14 +50,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutter.slices import slices
 from chipload.cutting.load_parts import CHIP as THICKEST
 from chipload.cutting.load_parts import LoadParts, load_parts, runout_of
 from chipload.cutting.material import Material
@@ -78,9 +66,7 @@ from chipload.simulation.checkpoint import in_rows
 from chipload.simulation.loads import LOADS, Cuts
 from chipload.simulation.moves import MoveRun, remove_by_moves
 from chipload.simulation.steps import Steps, rows_of_steps, step_boxes
-from chipload.simulation.swept_area import swept_ahead
 from chipload.stock.layers import LayeredStock
-from chipload.stock.tile_rings import TileRings
 
 if TYPE_CHECKING:
     from chipload.simulation.removal import RunSettings
@@ -88,8 +74,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
-#: columns of some steps in a stock, which changes
-Remove = Callable[[Steps, LayeredStock, "RunSettings"], Columns]
 #: parts of the errors of the loads of some cuts, by column
 SomeParts = list[dict[str, tuple[LoadParts, ...]]]
 #: greatest loads of a step that is computed a second time, by column: at the instants of the run (none if that is not
@@ -108,15 +92,9 @@ COMPARABLE = (*COMPARED, "force_normal_n")
 AXIAL = "force_axial_n"
 #: earlier steps that are removed a second time: at most this share of those of the run, or this number in a short run
 SHARE, LEAST = 0.05, 60
-#: likewise, for steps that remove more than is engaged at their middle
-MISSED_SHARE, MISSED_LEAST = 0.05, 1000
-#: least number of slices of the corner in the finer run
-FINE = 48
 #: factor on the difference of the two resolutions: upright axis, leaning axis
 FACTOR, LEANING = 2.0, 3.0
-#: error that both resolutions share: upright axis, leaning axis
-FLOOR, LEANING_FLOOR = 0.01, 0.02
-#: by moves: error of a column that a few steps do not show
+#: error of a column that a few steps do not show
 MOVES_FLOOR = {
     "force_n": 0.005, "torque_nm": 0.005, "torque_mean_nm": 0.005, "power_w": 0.005, "chip_max_mm": 0.035,
     "force_normal_n": 0.035, AXIAL: 0.035,
@@ -127,25 +105,15 @@ FLAT_FLOOR = {
     "force_n": 0.01, "torque_nm": 0.01, "torque_mean_nm": 0.005, "power_w": 0.005, "chip_max_mm": 0.01,
     "force_normal_n": 0.01, AXIAL: 0.01,
 }  # fmt: skip
-#: by layers, of barrel cutters
-BARREL_FLOOR = {
-    "force_n": 0.035, "torque_nm": 0.035, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.035,
-    "force_normal_n": 0.035, AXIAL: 0.035,
-}  # fmt: skip
 #: the same if an axis leans, for any cutter
 LEANING_MOVES_FLOOR = {
     "force_n": 0.05, "torque_nm": 0.05, "torque_mean_nm": 0.02, "power_w": 0.02, "chip_max_mm": 0.05,
     "force_normal_n": 0.05, AXIAL: 0.05,
 }  # fmt: skip
-#: by moves: number of slices of the finer run over that of the run, and of its rotations
+#: number of slices of the finer run over that of the run, and of its rotations
 MORE, FINER = 4, 4
-#: layers of the finer stock: thickness of the lowest in diameters, and ratio to the thickness of the layer below
-LOWEST, GROWTH = 5e-4, 1.3
 #: steps that are computed besides the worst ones
 EVEN, IDLE = 3, 2
-#: by layers: number of steps that remove most of what is not engaged at their middle, its least share of what they
-#: remove, and the number of parts of such a step
-MISSED, UNLIKE, PARTS = 3, 0.1, 16
 #: greatest error of the chip of a step that is computed a second time: of its loads
 CHIP = "chip_error"
 #: rows of columns that are read together
@@ -189,16 +157,13 @@ def energy_balance(columns: Columns, ktc: float) -> dict[int, float]:
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """A step that is computed a second time: its number, its box, the earlier steps that reach into the box, and the
-    number of its parts.
-    """
+    """A step that is computed a second time: its number, its box, and the earlier steps that reach into the box."""
 
     step: int
     own: Steps
     low: Floats
     high: Floats
     earlier: tuple[Steps, ...]
-    parts: int = 2
 
     @property
     def upright(self) -> bool:
@@ -233,7 +198,7 @@ def resolution_error(
     before : the stock before the run; it is not changed
     columns : of the removal
     setting : of the run
-    again : :func:`layers_again` or :func:`moves_again`
+    again : :func:`moves_again`
     names : columns that are compared, of :data:`COMPARABLE` and :data:`AXIAL`; the force among them
 
     Returns
@@ -242,23 +207,15 @@ def resolution_error(
     one has not; parts by tool and column
     """
     chosen, count = _chosen_steps(columns, before, names)
-    missed = _missed_steps(columns) if setting.moves is None else []
-    chosen = list(dict.fromkeys([*chosen[:1], *missed, *chosen[1:]]))
     found = dict.fromkeys((*names, *WITH_FORCE), 0.0)
     excess, chip, parts = dict.fromkeys(names, 0.0), dict.fromkeys(names, 0.0), PartsOfTools()
     worst = {name: float(np.max(columns[name], initial=0.0)) for name in names}
     budget, spent = max(int(SHARE * count), LEAST), 0
-    left = max(int(MISSED_SHARE * count), MISSED_LEAST)
     of_tools = [k for k in _worst_of_tools(columns, setting.cutters, setting.material) if k not in chosen]
-    windows = {
-        w.step: replace(w, parts=PARTS if w.step in missed else 2)
-        for w in _windows(blocks, [*chosen, *of_tools], setting)
-    }
+    windows = {w.step: w for w in _windows(blocks, [*chosen, *of_tools], setting)}
     for number, step in enumerate(chosen):
         window = windows[step]
-        if step in missed and window.cost <= left:
-            left -= window.cost
-        elif number == 0 or spent + window.cost <= budget:
+        if number == 0 or spent + window.cost <= budget:
             spent += window.cost
         else:
             continue
@@ -278,20 +235,14 @@ def resolution_error(
             _keep_worst(parts, int(windows[step].own.tool[0]), again(windows[step])[2])
     # the flank of a flat mill is cut into slices where its contact changes: exact
     straight = all(c.straight for c in _used_cutters(windows, setting))
-    barrels = any(c.barrel_radius is not None for c in _used_cutters(windows, setting))
     if "chip_max_mm" in chip and not all(c.teeth_alike for c in _used_cutters(windows, setting)):
         chip["chip_max_mm"] += 2.0 * PARTS_OF_EDGE
-    films, least = _films(columns), FLOOR if all(w.upright for w in windows.values()) else LEANING_FLOOR
+    films = _films(columns)
+    floors = MOVES_FLOOR if setting.run.upright else LEANING_MOVES_FLOOR
+    floors = FLAT_FLOOR if straight and setting.run.upright else floors
     for name in names:
         if worst[name] > 0.0 and films < 1.0:
-            floor = least
-            if setting.moves is not None:
-                floor = (MOVES_FLOOR if setting.moves.upright else LEANING_MOVES_FLOOR)[name]
-                if straight and setting.moves.upright:
-                    floor = FLAT_FLOOR[name]
-            elif barrels:
-                floor = max(BARREL_FLOOR[name], least)
-            found[name] = excess[name] / worst[name] + floor + films / (1.0 - films) + chip[name]
+            found[name] = excess[name] / worst[name] + floors[name] + films / (1.0 - films) + chip[name]
         elif excess[name] > 0.0 or films > 0.0:
             found[name] = math.inf
     force = found["force_n"]
@@ -330,10 +281,9 @@ def _of_worst(parts: PartsOfTools, columns: Columns) -> PartsOfTools:
 
 
 def _used_cutters(windows: Mapping[int, Window], setting: RunSettings) -> list[Cutter]:
-    """Return the cutters of the steps that are computed once more; of a run by moves those that made a move."""
+    """Return the cutters of the steps that are computed once more, and of those that made a move."""
     some = {int(w.own.tool[0]) for w in windows.values()}
-    if setting.moves is not None:
-        some |= set(setting.moves.stock.table) & set(setting.cutters)
+    some |= set(setting.run.stock.table) & set(setting.cutters)
     return [setting.cutters[n] for n in sorted(some)]
 
 
@@ -369,15 +319,6 @@ def _worst_of_tools(columns: Columns, cutters: Mapping[int, Cutter], material: M
         rise = np.divide(runout_of(cutters[number])[0], chip, out=np.zeros(len(own)), where=chip > 0.0)
         out += [int(own[_among_worst(x)]) for x in (force[own], force[own] * (1.0 + rise))]
     return out
-
-
-def _missed_steps(columns: Columns) -> list[int]:
-    """Return the steps that lose most volume that their middle does not engage, as where a mill meets a wall."""
-    volume = np.where(np.asarray(columns["rapid"]), 0.0, np.asarray(columns["chip_volume_mm3"]))
-    more = volume - np.asarray(columns["engaged_volume_mm3"])
-    more = np.where((more > UNLIKE * volume) & (np.asarray(columns["chip_areas"]) > 0), more, 0.0)
-    order = np.argsort(-more, kind="stable")[:MISSED]
-    return [int(k) for k in order if more[k] > 0.0]
 
 
 def _among_worst(values: Floats) -> int:
@@ -416,17 +357,6 @@ def _windows(blocks: Iterable[Steps], chosen: list[int], setting: RunSettings) -
     return [Window(k, *own[k], tuple(earlier[k])) for k in chosen]
 
 
-def layers_again(before: LayeredStock, setting: RunSettings, remove: Remove) -> Again:
-    """Compute steps again in a finer stock of layers; ``remove`` returns the columns of some steps."""
-
-    def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float], SomeParts]:
-        watch = _PartsWatch(setting.material)
-        fine = _finer_layers(window, before, replace(setting, watch=watch), remove)
-        return (fine if window.parts == 2 else {}), fine, watch.found
-
-    return again
-
-
 def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
     """Steps by moves with more slices; of the run's ``columns`` the volume says at how many instants it looked at a
     step.
@@ -455,64 +385,9 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
         alike = [loads_of(window, window.own, (n, n)) for n in (1, *run.stock.more)]
         same, _, cuts = min(alike, key=lambda each: abs(each[1] - volume))
         own = [load_parts(c.plain, c.cutter, setting.material) for c in cuts if len(c)]
-        return same, loads_of(window, _parts(window.own, window.parts), None)[0], own
+        return same, loads_of(window, _halves(window.own), None)[0], own
 
     return again
-
-
-def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, remove: Remove) -> dict[str, float]:
-    """Return the greatest loads in the parts of a step, in a finer stock."""
-    tool = int(window.own.tool[0])
-    cutter = setting.cutters[tool]
-    stock = before.cropped(window.low[:2], window.high[:2])
-    if stock is None:
-        return dict.fromkeys((*COMPARABLE, AXIAL, CHIP), 0.0)
-    low, high = float(window.low[2]), float(window.high[2])
-    thickest = 0.5 * float(np.median(before.thickness[slice(*_span(before, low, high))]))
-    heights, z, thin = [low], low, LOWEST * cutter.diameter
-    while z < high:
-        z += min(thin, thickest)
-        thin *= GROWTH
-        heights.append(z)
-    stock.refine_at(heights, 0.25 * LOWEST * cutter.diameter)
-    fine = setting.resolution
-    pieces = max(2 * fine.corner_slices, FINE)
-    fine = replace(
-        fine,
-        rotation=0.5 * fine.rotation,
-        corner_slices=pieces,
-        flank_mm=0.5 * fine.flank_mm,
-        bottom_slices=2 * fine.bottom_slices,
-    )
-    profile = slices(
-        cutter,
-        bottom_slices=fine.bottom_slices,
-        corner_slices=fine.corner_slices,
-        flank_mm=fine.flank_mm,
-        grading=max(fine.grading, 2.0) if window.upright else fine.grading,
-    )
-    again = replace(setting, profiles={tool: profile}, resolution=fine)
-    tolerance = fine.tolerance
-    for some in window.earlier:
-        tiles = TileRings(stock)
-        for _, swept in swept_ahead(some, stock, setting.cutters, tolerance, setting.workers):
-            tiles.remove(swept.met, swept.shape, swept.areas, 0.0, 0.5 * tolerance)
-        tiles.finish()
-    columns = remove(_parts(window.own, window.parts), stock, again)
-    worst = {name: float(columns[name].max()) for name in COMPARABLE} | {AXIAL: float(axial_force(columns).max())}
-    return worst | {CHIP: float(np.max(columns.get(CHIP, 0.0)))}
-
-
-@dataclass(eq=False)
-class _PartsWatch:
-    """A watch that gives the error of the chip of each step, and keeps the parts of the errors of its loads."""
-
-    material: Material
-    found: SomeParts = field(default_factory=list)
-
-    def __call__(self, cuts: Cuts) -> dict[str, Floats]:
-        self.found.append(load_parts(cuts.plain, cuts.cutter, self.material))
-        return {CHIP: chip_error(cuts.plain, cuts.cutter)}
 
 
 def axial_force(columns: Columns) -> Floats:
@@ -520,16 +395,11 @@ def axial_force(columns: Columns) -> Floats:
     return np.maximum(np.abs(columns["force_z_max_n"]), np.abs(columns["force_z_min_n"]))
 
 
-def _span(stock: LayeredStock, low: float, high: float) -> tuple[int, int]:
-    layers = stock.layers_between(low, high)
-    return (layers.start, layers.stop) if layers else (0, stock.layers)
-
-
-def _parts(step: Steps, count: int) -> Steps:
-    """Return a step divided into steps of equal length and time, with the axis interpolated between its directions."""
-    t = np.linspace(0.0, 1.0, count + 1)[:, None]
+def _halves(step: Steps) -> Steps:
+    """Return the two halves of a step in time, with the axis interpolated between its directions."""
+    t = np.array([[0.0], [0.5], [1.0]])
     p, a = step.p0 + t * (step.p1 - step.p0), step.a0 + t * (step.a1 - step.a0)
     p[-1], a = step.p1[0], a / np.linalg.norm(a, axis=1)[:, None]
-    alike = {f.name: np.repeat(getattr(step, f.name), count) for f in fields(Steps) if getattr(step, f.name).ndim == 1}
-    alike["seconds"] = alike["seconds"] / count
+    alike = {f.name: np.repeat(getattr(step, f.name), 2) for f in fields(Steps) if getattr(step, f.name).ndim == 1}
+    alike["seconds"] = alike["seconds"] / 2
     return Steps(**alike, p0=p[:-1], p1=p[1:], a0=a[:-1], a1=a[1:])

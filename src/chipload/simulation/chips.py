@@ -1,12 +1,7 @@
-"""Simulation of a Program in a layered workpiece: the removal and the loads of every step.
+"""Simulation of a Program in a workpiece: the removal and the loads of every step, by :mod:`chipload.simulation.moves`.
 
-Notation: a step as in :mod:`chipload.simulation.steps`; t in 0..1 within it. Its chip is, layer by layer, what the
-cutter covers during the step and what is still there; its volume the sum of area times thickness. Where the stock's
-edges are made simpler, by half the tolerance, what that takes or gives counts with the step. Forces are those at
-the middle of the step (t = 1/2), on the cutter, in the work frame, over one revolution of the spindle.
-
-What is known at each layer is the section at half its height: see :mod:`chipload.stock.layers` for the error in volume
-and :mod:`chipload.engagement.immersion.immersion` for the one in force.
+Notation: a step as in :mod:`chipload.simulation.steps`. Its chip is what the cutter covers during the step and what is
+still there. Forces are on the cutter, in the work frame, over one revolution of the spindle.
 """
 
 from __future__ import annotations
@@ -20,10 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutter.slices import Slices, slices
-from chipload.cutting.band import deviations, mean_basis
+from chipload.cutting.band import deviations
 from chipload.cutting.material import Material
-from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import Finding, InputError
 from chipload.number_text import number_text
 from chipload.program.motions import lengths
@@ -34,22 +27,15 @@ from chipload.simulation.accuracy import (
     WITH_FORCE,
     PartsOfTools,
     energy_balance,
-    layers_again,
     moves_again,
     resolution_error,
 )
-from chipload.simulation.layer_removal import removed_by_layers
 from chipload.simulation.loads import (
     LOADS,
     Cuts,
-    bands_of_steps,
-    engagement_of_steps,
     join_cuts,
-    loads_of_steps,
-    over_turn,
 )
 from chipload.simulation.moves import (
-    Engine,
     MaterialAboveFlutes,
     Moved,
     MoveRun,
@@ -92,7 +78,6 @@ def remove(
     times: Floats | None = None,
     accuracy: bool = True,
     workers: int = 2,
-    engine: Engine = "moves",
     loads: bool = True,
     outlines: bool = True,
     seen: Seen = unseen,
@@ -114,10 +99,9 @@ def remove(
         and ``duration_s``; None: at the commanded feed, rapids take none
     accuracy : calculate ``energy_balance`` and ``resolution_error``, for which some steps are computed once more
     workers : threads; the result does not depend on them
-    engine : ``moves``, see :mod:`chipload.simulation.moves`; ``layers`` is another method, to compare with
-    loads : False: only what is removed is needed; moves then leave the loads 0
-    outlines : False: of what is left only the volume is needed: moves then leave ``stock`` as it was, and its volume
-        after them is that before less the chips
+    loads : False: only what is removed is needed; the loads are 0
+    outlines : False: of what is left only the volume is needed: ``stock`` stays as it was, and its volume afterwards is
+        that before less the chips
     seen : takes the columns of each block of steps as soon as they are known
 
     Returns
@@ -126,7 +110,7 @@ def remove(
         With the columns ``line``, ``tool``, ``label``, ``rapid``, ``s_mm``, ``t_s``, ``duration_s`` (on the
     machine), ``seconds`` (at the commanded feed, which chips and loads go by), ``x_mm``, ``y_mm``, ``z_mm``,
     ``axis_x..z``, ``feed_mm_min``, ``axial_overrun_mm`` (height of the shank that stands in material above the flutes
-    when the step ends), ``chip_volume_mm3``, ``chip_areas`` (most on one layer),
+    when the step ends), ``chip_volume_mm3``, ``chip_areas`` (pieces of the engaged surface),
     ``chip_layers`` (layers that lost something; where all of it is films, narrower than a few tolerances, there are no
     pieces and no loads), ``chip_max_mm`` (thickest),
     ``force_{x,y,z}_{mean,max,min}_n`` over the revolution, ``force_n`` (greatest size), ``torque_mean_nm``,
@@ -142,12 +126,12 @@ def remove(
 
     Notes
     -----
-    O(n l m): n steps, l layers under the cutter, m edges of the stock around it; m does not grow with n.
+    O(n m): n steps, m earlier moves near each.
     """
     count = count_steps(program, cutters, resolution)
     progress(0.0, "removing")
-    setting = setting_of(cutters, material, resolution, watch, workers)
-    setting = with_engine(engine, replace(setting, loads=loads), program, stock)
+    setting = RunSettings(cutters, material, resolution, watch, workers, loads=loads)
+    setting = with_moves(setting, program, stock)
     before = stock.copied() if accuracy else None
     while True:
         begun = sums = RunningSums(stock.volume(), shank=setting.asks_shank)
@@ -161,13 +145,13 @@ def remove(
                     kept.setdefault(engaged.tool, []).append(engaged)
             break
         except MaterialAboveFlutes:
-            setting = with_engine(engine, setting, program, stock, shank=True)
+            setting = with_moves(setting, program, stock, shank=True)
     progress(1.0, "removed")
     cut = tuple(join_cuts(kept[number]) for number in sorted(kept))
-    if setting.moves is not None and outlines:
-        setting.moves.finish(stock, setting.workers)
+    if outlines:
+        setting.run.finish(stock, setting.workers)
     removal = removal_of(program, stock, material, sums, stack_blocks(columns), cut)
-    if setting.moves is not None and not outlines:
+    if not outlines:
         chips = float(removal.columns["chip_volume_mm3"].sum())
         removal = replace(removal, volume_after=removal.volume_before - chips)
     return with_accuracy(removal, program, before, setting)
@@ -181,28 +165,26 @@ def _blocks_removed(
     blocks = steps_in_blocks(program, fine.step_mm, fine.tolerance, size=size, times=times)
     runs = runs_of_threads(program, stock, setting, count)
     for steps, moved in remove_in_strips(blocks, setting, runs, sums.steps):
-        sums, some, cuts = remove_block(steps, stock, sums, setting, moved)
+        sums, some, cuts = remove_block(steps, moved, sums, setting)
         yield sums, some, cuts
 
 
 def block_of(setting: RunSettings) -> int:
-    """Steps that are simulated together: by moves of an upright axis some more, of which each costs less."""
-    return MOVES * BLOCK if setting.moves is not None and setting.moves.upright else BLOCK
+    """Steps that are simulated together: of an upright axis some more, of which each costs less."""
+    return MOVES * BLOCK if setting.run.upright else BLOCK
 
 
-def with_engine(
-    engine: Engine, setting: RunSettings, program: Program, stock: LayeredStock, *, shank: bool = False
-) -> RunSettings:
-    """Return the settings with the engine; ``shank``: material stands above the flutes, and the shank is looked for."""
-    return setting if engine == "layers" else replace(setting, moves=_run_of(setting, program, stock, shank=shank))
+def with_moves(setting: RunSettings, program: Program, stock: LayeredStock, *, shank: bool = False) -> RunSettings:
+    """Return the settings with the run of the program by moves; ``shank``: material stands above the flutes, and the
+    shank is looked for.
+    """
+    return replace(setting, moves=_run_of(setting, program, stock, shank=shank))
 
 
 def runs_of_threads(program: Program, stock: LayeredStock, setting: RunSettings, count: int) -> list[MoveRun]:
-    """Return the run of each thread that shares ``count`` steps, that of the settings first; none by layers."""
-    if setting.moves is None:
-        return []
+    """Return the run of each thread that shares ``count`` steps, that of the settings first."""
     further = number_of_strips(setting.workers, count, block_of(setting)) - 1
-    return [setting.moves, *(_run_of(setting, program, stock, shank=setting.asks_shank) for _ in range(further))]
+    return [setting.run, *(_run_of(setting, program, stock, shank=setting.asks_shank) for _ in range(further))]
 
 
 def _run_of(setting: RunSettings, program: Program, stock: LayeredStock, *, shank: bool) -> MoveRun:
@@ -242,36 +224,8 @@ def resolution_error_of(
     if not setting.resolution.estimated:
         return dict.fromkeys((*names, *WITH_FORCE), math.inf), {}
     blocks = StepBlocks(program, setting.resolution.step_mm, setting.resolution.tolerance)
-    if setting.moves is None:
-        again = layers_again(
-            before, setting, lambda steps, stock, to: remove_block(steps, stock, RunningSums(0.0), to)[1]
-        )
-    else:
-        again = moves_again(setting, setting.moves, columns)
+    again = moves_again(setting, setting.run, columns)
     return resolution_error(blocks, before, columns, setting, again, names)
-
-
-def setting_of(
-    cutters: Mapping[int, Cutter],
-    material: Material,
-    resolution: Resolution,
-    watch: Watch | None,
-    workers: int,
-) -> RunSettings:
-    """Return the settings of a run."""
-    profiles = {n: profile_of(c, resolution) for n, c in cutters.items()}
-    return RunSettings(cutters, profiles, material, resolution, watch, workers)
-
-
-def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:
-    """Return the slices of a cutter at a resolution."""
-    return slices(
-        cutter,
-        bottom_slices=resolution.bottom_slices,
-        corner_slices=resolution.corner_slices,
-        flank_mm=resolution.flank_mm,
-        grading=resolution.grading,
-    )
 
 
 def require_steps(program: Program, step_mm: float) -> float:
@@ -314,56 +268,19 @@ def count_steps(program: Program, cutters: Mapping[int, Cutter], resolution: Res
 
 
 def remove_block(
-    steps: Steps,
-    stock: LayeredStock,
-    sums: RunningSums,
-    setting: RunSettings,
-    moved: Moved | None = None,
-) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
-    """Remove the cuts of some steps from the stock; return the sums after them, their columns and tooth engagement.
-
-    ``moved`` is their removal by moves; None: they are removed from the layers of the stock.
-    """
-    if moved is not None:
-        return _moved_block(steps, moved, sums, setting)
-    removed, engagement = removed_by_layers(steps, stock, setting)
-    loads, basis, cut = np.zeros((len(steps), len(LOADS))), sums.basis, list[Cuts]()
-    watched: dict[str, Floats] = {}
-    for number in sorted({int(steps.tool[c.step]) for c in engagement}):
-        own = [c for c in engagement if steps.tool[c.step] == number]
-        at, cutter, material = [c.step for c in own], setting.cutters[number], setting.material
-        plain = engagement_of_steps(own, setting.profiles[number])
-        bitten = chips_of_teeth(plain, cutter)
-        turn = over_turn(bitten, cutter, material, setting.resolution.rotation)
-        loads[at] = loads_of_steps(plain, bitten, own, cutter, material, turn, steps.spindle[at], steps.seconds[at])
-        ends = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
-        cut.append(Cuts(number, cutter, sums.steps + np.array(at), ends, bitten, plain, steps.spindle[at]))
-        if setting.watch is not None:
-            for name, values in setting.watch(cut[-1]).items():
-                watched.setdefault(name, np.zeros(len(steps)))[at] = values
-        for name, values in bands_of_steps(bitten, cutter, material, turn, steps.spindle[at]).items():
-            watched.setdefault(name, np.zeros(len(steps)))[at] = values
-        if material.has_band:
-            each = mean_basis(bitten, cutter, material, bitten.frame)
-            basis = basis + np.tensordot(steps.seconds[at], each, 1)
-    columns = {**_columns(steps, removed, loads, sums), **watched}
-    return _add_steps(sums, steps, removed, columns, basis), columns, cut
-
-
-def _moved_block(
     steps: Steps, found: Moved, sums: RunningSums, setting: RunSettings
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
-    """:func:`remove_block` by moves."""
+    """Return the sums after some steps, whose removal was ``found``, their columns and tooth engagement."""
     watched: dict[str, Floats] = dict(found.bands)
     if setting.watch is not None:
         for cut in found.cuts:
             for name, values in setting.watch(cut).items():
                 watched.setdefault(name, np.zeros(len(steps)))[cut.step - sums.steps] = values
-    columns = {**_columns(steps, found.removed, found.loads, sums), **watched}
-    return _add_steps(sums, steps, found.removed, columns, sums.basis + found.basis), columns, found.cuts
+    columns = {**columns_of_steps(steps, found.removed, found.loads, sums), **watched}
+    return add_steps(sums, steps, found.removed, columns, sums.basis + found.basis), columns, found.cuts
 
 
-def _add_steps(
+def add_steps(
     sums: RunningSums,
     steps: Steps,
     removed: Floats,
@@ -412,7 +329,8 @@ def stack_blocks(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:
     }
 
 
-def _columns(steps: Steps, removed: Floats, loads: Floats, sums: RunningSums) -> dict[str, NDArray[Any]]:
+def columns_of_steps(steps: Steps, removed: Floats, loads: Floats, sums: RunningSums) -> dict[str, NDArray[Any]]:
+    """Return the columns of some steps that every run has."""
     length = np.linalg.norm(steps.p1 - steps.p0, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         feed = np.where(steps.seconds > 0.0, mm_min_from_mm_s(1.0) * length / steps.seconds, 0.0)

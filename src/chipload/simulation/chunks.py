@@ -31,10 +31,9 @@ from chipload.simulation.chips import (
     removal_of,
     remove_block,
     runs_of_threads,
-    setting_of,
     stack_blocks,
     with_accuracy,
-    with_engine,
+    with_moves,
 )
 from chipload.simulation.moves import MaterialAboveFlutes
 from chipload.simulation.removal import Columns, Removal, Resolution, RunningSums, RunSettings, Seen, Watch, unseen
@@ -104,8 +103,8 @@ def remove_in_chunks(
         As :func:`chipload.simulation.chips.remove`, and where the folder cannot be used.
     """
     count = count_steps(program, cutters, resolution)
-    setting = setting_of(cutters, material, resolution, watch, workers)
-    shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.room, stock.tidied, stock.tiles)
+    setting = RunSettings(cutters, material, resolution, watch, workers)
+    shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.tiles)
     part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))
     depends = (program, cutters, material, resolution, shape, part, watch is not None, BLOCK, times)
     kept = unfinished.begin(digest(*depends, also))
@@ -121,7 +120,7 @@ def remove_in_chunks(
                 state_of.clear()
             kept = None
     sums = sums if kept is None else found_sums
-    setting = with_engine("moves", setting, program, stock, shank=sums.shank)
+    setting = with_moves(setting, program, stock, shank=sums.shank)
     progress(sums.steps / count, "removing")
     if kept is not None:
         unfinished.notice(f"continues after step {sums.steps} of {count}, kept in {unfinished.folder}")
@@ -129,14 +128,13 @@ def remove_in_chunks(
         sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, seen, progress)
     except MaterialAboveFlutes as found:
         unfinished.again(f"starts from the beginning, and asks for the shank in material: line {found.line}: {found}")
-        setting = with_engine("moves", setting, program, stock, shank=True)
+        setting = with_moves(setting, program, stock, shank=True)
         sums = RunningSums(stock.volume(), shank=True)
         for state_of in keeps.values():
             state_of.clear()
         sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, seen, progress)
-    if setting.moves is not None:
-        setting.moves.finish(stock, setting.workers)
-        return_free_memory()
+    setting.run.finish(stock, setting.workers)
+    return_free_memory()
     progress(1.0, "removed")
     every: Columns = unfinished.columns() if unfinished.parts else stack_blocks(columns)
     return with_accuracy(removal_of(program, stock, material, sums, every), program, before, setting)
@@ -173,7 +171,7 @@ def _remove_steps(
             list(pool.map(lambda run: run.skip(program, resolution.step_mm, done), runs))
     for steps, moved in remove_in_strips(blocks, setting, runs, done):
         progress(sums.steps / count, "removing")
-        sums, some, _ = remove_block(steps, stock, sums, setting, moved)
+        sums, some, _ = remove_block(steps, moved, sums, setting)
         seen(some)
         columns.append(some)
         waiting += len(steps)

@@ -1,4 +1,4 @@
-"""The engine ``moves``: removal and loads of the steps of a cutter from the volume that earlier moves swept.
+"""Removal and loads of the steps of a cutter from the volume that earlier moves swept.
 
 Notation: as in :mod:`chipload.engagement.moves`, and in :mod:`chipload.engagement.bricks` where the axis leans or
 turns. A step is calculated at its middle, and a long step at more instants, the middles of equal parts of it. Its
@@ -19,7 +19,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,6 @@ skew = LateModule("chipload.engagement.moves._skew_slices")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Engine = Literal["moves", "layers"]
 
 #: slices of the engaged part of a corner over those that are asked for of the whole corner: the greatest force is then
 #: within 3 % of the converged one in 99 of 100 moves of a finishing program at the default of a job, see
@@ -374,7 +373,7 @@ def loads_of_instants(
     [rad] at which force and torque are greatest, and (m, 4, 6) basis of the mean loads along T, n and the
     axis.
 
-    Oracle: :func:`chipload.simulation.loads.loads_of_steps`, which takes rotation by rotation.
+    Oracle: ``tests/layer_oracle/loads.py``, which takes rotation by rotation.
     """
     each, at, basis = loads_over_turn(engagement, cutter, material, rotation, left)
     each[:, 10:12] /= 1000.0

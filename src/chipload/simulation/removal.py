@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutter.slices import Slices
 from chipload.cutting.load_parts import LoadParts
 from chipload.cutting.material import Material
 from chipload.engagement.chips.move import Move
@@ -161,18 +160,23 @@ def removal_between(whole: Removal, first: int, end: int) -> Removal:
 
 @dataclass(frozen=True, eq=False)
 class RunSettings:
-    """What a run keeps to, step after step: see :func:`remove`; ``profiles`` are slices of the cutters;
-    ``moves`` the run by moves, None: by layers; ``workers`` threads; ``loads`` False: moves leave the loads 0.
+    """What a run keeps to, step after step: see :func:`chipload.simulation.chips.remove`; ``moves`` the run of the
+    program, None before it is made; ``workers`` threads; ``loads`` False: the loads are 0.
     """
 
     cutters: Mapping[int, Cutter]
-    profiles: Mapping[int, Slices]
     material: Material
     resolution: Resolution
     watch: Watch | None
     workers: int
     moves: MoveRun | None = None
     loads: bool = True
+
+    @property
+    def run(self) -> MoveRun:
+        """The run of the program."""
+        assert self.moves is not None
+        return self.moves
 
     @property
     def asks_shank(self) -> bool:

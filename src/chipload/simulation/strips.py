@@ -54,18 +54,14 @@ def number_of_strips(workers: int, steps: int, block: int) -> int:
 
 def remove_in_strips(
     blocks: Iterable[Steps], setting: RunSettings, runs: Sequence[MoveRun], first: int
-) -> Iterator[tuple[Steps, Moved | None]]:
+) -> Iterator[tuple[Steps, Moved]]:
     """Yield blocks of steps with their removal, in their order.
 
     Parameters
     ----------
-    runs : one for each thread, alike and with the moves before the first block; none: by layers, the removal is None
+    runs : one for each thread, alike and with the moves before the first block
     first : number of the first step
     """
-    if not runs:
-        for steps in blocks:
-            yield steps, None
-        return
 
     def calculate(run: MoveRun, steps: Steps, number: int, found: Engaged | None = None) -> Moved:
         return remove_by_moves(

@@ -22,11 +22,10 @@ from shapely import MultiPolygon, Polygon
 from chipload.errors import InputError
 from chipload.files import write_whole
 from chipload.geometry.mesh import require_closed
-from chipload.lazy import LateModule, trimesh
+from chipload.lazy import trimesh
 from chipload.stock.earlier_moves import SAVED_MOVES, EarlierMoves, no_moves
 from chipload.stock.shapes import read_shapes, shape_bytes
-from chipload.stock.simpler import simplify_tiles
-from chipload.stock.solid import glb, prisms, stepped_body
+from chipload.stock.solid import prisms, stepped_body
 from chipload.stock.tile_grid import (
     LAYER_LIMIT,
     MULTIPOLYGON,
@@ -41,20 +40,16 @@ from chipload.stock.tile_grid import (
     turns_of,
 )
 
-_ring_edges = LateModule("chipload.stock._ring_edges")
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Shapes = NDArray[np.object_]
 
 #: kind of a saved stock
-KIND = "chipload layered stock 2"
+KIND = "chipload layered stock 3"
 #: arrays of a saved stock and their numbers of dimensions
-SAVED = {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "room": 1, "tidied": 1, "vertices": 2, "faces": 2} | SAVED_MOVES
+SAVED = {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "vertices": 2, "faces": 2} | SAVED_MOVES
 #: shortest side of a block [mm]
 LEAST_MM = 1e-3
-#: least number of points of a tile that is simplified
-ROOM = 128
 
 
 class LayeredStock:
@@ -72,9 +67,7 @@ class LayeredStock:
 
     Notes
     -----
-    ``tidied`` [mm^3] is the volume that the stock has gained by the simplification of edges, ``room`` the number of
-    points of each tile above which it is simplified next. ``by_geos`` is the number of tiles that
-    :class:`chipload.stock.tile_rings.TileRings` left to GEOS, since the stock was made or loaded. ``sections`` of the
+    ``sections`` of the
     part by height [mm] are shared by copies and parts of a stock, which are split at the same heights again and again.
     ``earlier`` are the moves that cut the stock: its body is the part, or the box of its layers, less what they swept.
     None where nothing was removed, or where its layers are all that is known.
@@ -96,9 +89,6 @@ class LayeredStock:
         self.tiles = tiles
         self.part = part
         self.cut: NDArray[np.bool_] = np.zeros(len(tiles), dtype=np.bool_)
-        self.room: Ints = np.full(tiles.shape, ROOM, dtype=np.int64)
-        self.tidied = 0.0
-        self.by_geos = 0
         self.earlier: EarlierMoves | None = None
         self.sections: dict[float, MultiPolygon] = {}
 
@@ -180,10 +170,6 @@ class LayeredStock:
         """(n,) float [mm]: the middle of each layer, at which its section lies."""
         return 0.5 * (self.bounds[:-1] + self.bounds[1:])
 
-    def borders(self, rows: Ints, columns: Ints) -> Floats:
-        """Return the borders of tiles, (n, 4) float [mm]: least x and y, greatest x and y."""
-        return np.column_stack([self.xs[columns], self.ys[rows], self.xs[columns + 1], self.ys[rows + 1]])
-
     def layers_between(self, z0: float, z1: float) -> range:
         """Return the layers that reach into the open interval z0 < z < z1 [mm]."""
         first = int(np.searchsorted(self.bounds, z0, "right")) - 1
@@ -203,30 +189,6 @@ class LayeredStock:
         """Return the remaining area of a layer [mm^2]."""
         return math.fsum(shapely.area(self.tiles[self._layer(layer)]).ravel())
 
-    def edges(self, layers: range, low: ArrayLike, high: ArrayLike) -> tuple[Floats, Ints, Floats]:
-        """Return the edges of the rings in the tiles of neighbouring layers under a rectangle.
-
-        Parameters
-        ----------
-        low, high : (2,) float [mm], corners of the rectangle
-
-        Returns
-        -------
-        bounds : (l + 1,) float [mm], of the layers
-        start : (l + 1,) int; layer i has the edges start[i] .. start[i + 1] - 1
-        edges : (m, 4) float [mm], rows x0, y0, x1, y1; those that no ray along +x from the rectangle meets are left out
-        """
-        (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-        i, j = span(self.xs.tolist(), x0, x1), span(self.ys.tolist(), y0, y1)
-        tiles = self.tiles[layers.start : layers.stop, j.start : j.stop, i.start : i.stop]
-        width = max(tiles.shape[1] * tiles.shape[2], 1)
-        parts, tile = shapely.get_parts(tiles.ravel(), return_index=True)
-        rings, part = shapely.get_rings(parts, return_index=True)
-        points, ring = shapely.get_coordinates(rings, return_index=True)
-        edges, start = np.empty((len(points), 4)), np.zeros(len(layers) + 1, dtype=np.int64)
-        count = _ring_edges.ring_edges(points, ring, tile[part] // width, x0, y0, y1, edges, start)
-        return self.bounds[layers.start : layers.stop + 1], start, edges[:count].copy()
-
     def volumes(self) -> Floats:
         """Return the remaining volume (n,) [mm^3] of each layer."""
         areas = shapely.area(self.tiles).reshape(self.layers, -1)
@@ -241,15 +203,9 @@ class LayeredStock:
         return self.remove_many([layer], [polygon])[0]
 
     def remove_many(
-        self, layers: Sequence[int] | Ints, shapes: Sequence[Polygon | MultiPolygon] | Shapes, tidy: float = 0.0
+        self, layers: Sequence[int] | Ints, shapes: Sequence[Polygon | MultiPolygon] | Shapes
     ) -> list[list[Polygon]]:
         """Remove polygon k from layer ``layers[k]``, for all k; in order if a layer occurs more than once.
-
-        Parameters
-        ----------
-        tidy : greatest displacement [mm] of an edge by simplification; 0: none. Repeated cuts along the same wall leave
-            many short edges; a tile is simplified when its number of points has doubled. The volume that the stock
-            gains (mm^3, signed) is added to ``tidied``
 
         Returns
         -------
@@ -274,7 +230,7 @@ class LayeredStock:
         chips: list[list[Polygon]] = [[] for _ in rows]
         self.earlier = None
         for turn in turns_of(rows):
-            self._remove_turn(turn, rows, geometries, chips, tidy)
+            self._remove_turn(turn, rows, geometries, chips)
         return chips
 
     def refine(self, z0: float, z1: float, layer_mm: float) -> None:
@@ -315,7 +271,7 @@ class LayeredStock:
         parents = np.searchsorted(self.bounds, heights, "right") - 1
         boxes = boxes_of(self.xs, self.ys, len(heights))
         again = ~self.cut[parents] & (np.bincount(parents)[parents] > 1)
-        self.bounds, self.cut, self.room = bounds, self.cut[parents], self.room[parents]
+        self.bounds, self.cut = bounds, self.cut[parents]
         self.tiles = self.tiles[parents]
         if self.part is not None:
             self.tiles[again] = cut_up(self.part, heights[again], boxes, self.sections)
@@ -323,7 +279,7 @@ class LayeredStock:
     def copied(self) -> LayeredStock:
         """Return a copy of the present stock; polygons are shared."""
         out = LayeredStock(self.bounds, self.xs, self.ys, self.tiles.copy(), self.part)
-        out.cut, out.room, out.tidied = self.cut.copy(), self.room.copy(), self.tidied
+        out.cut = self.cut.copy()
         out.earlier, out.sections = self.earlier, self.sections
         return out
 
@@ -362,18 +318,14 @@ class LayeredStock:
         """Return the remaining stock as one closed mesh [mm] of a prism for each layer, z up."""
         return prisms([polygons(self.section(i)) for i in range(self.layers)], self.bounds)
 
-    def to_glb(self) -> bytes:
-        """Return the remaining stock as binary glTF, in metres with y up as the format requires."""
-        return glb(self.mesh())
-
-    def state(self) -> tuple[Floats, Shapes, NDArray[np.bool_], Ints, float, EarlierMoves | None]:
+    def state(self) -> tuple[Floats, Shapes, NDArray[np.bool_], EarlierMoves | None]:
         """Return the state with which :meth:`restore` undoes all later changes."""
-        return self.bounds, self.tiles.copy(), self.cut.copy(), self.room.copy(), self.tidied, self.earlier
+        return self.bounds, self.tiles.copy(), self.cut.copy(), self.earlier
 
-    def restore(self, state: tuple[Floats, Shapes, NDArray[np.bool_], Ints, float, EarlierMoves | None]) -> None:
+    def restore(self, state: tuple[Floats, Shapes, NDArray[np.bool_], EarlierMoves | None]) -> None:
         """Restore the stock to a state."""
         self.bounds, self.tiles, self.cut = state[0], state[1].copy(), state[2].copy()
-        self.room, self.tidied, self.earlier = state[3].copy(), state[4], state[5]
+        self.earlier = state[3]
 
     def save(self, path: str | Path) -> None:
         """Write the stock to one ``.npz`` file, completely or not at all."""
@@ -385,7 +337,6 @@ class LayeredStock:
         vertices = np.zeros((0, 3)) if part is None else np.asarray(part.vertices, dtype=np.float64)
         faces = np.zeros((0, 3), dtype=np.int64) if part is None else np.asarray(part.faces, dtype=np.int64)
         arrays = {"bounds": self.bounds, "xs": self.xs, "ys": self.ys, "cut": self.cut}
-        arrays |= {"room": self.room.ravel(), "tidied": np.array([self.tidied])}
         arrays |= no_moves() if self.earlier is None else self.earlier.arrays()
         return shape_bytes(KIND, arrays | {"vertices": vertices, "faces": faces}, areas_alone(self.tiles.ravel()))
 
@@ -407,8 +358,6 @@ class LayeredStock:
             or not all(np.isfinite(v).all() and (np.diff(v) > 0.0).all() for v in axes)
             or len(tiles) != math.prod(shape)
             or a["cut"].shape != shape[:1]
-            or a["room"].shape != (len(tiles),)
-            or a["tidied"].shape != (1,)
             or vertices.shape[1] != 3
             or faces.shape[1] != 3
             or (len(faces) > 0 and not (faces.min() >= 0 and faces.max() < len(vertices)))
@@ -422,12 +371,10 @@ class LayeredStock:
         part = trimesh.Trimesh(vertices, faces.astype(np.int64), process=False) if len(faces) else None
         stock = cls(axes[0], axes[1], axes[2], tiles.reshape(shape), part)
         stock.cut = a["cut"].astype(np.bool_)
-        stock.room = a["room"].astype(np.int64).reshape(shape)
-        stock.tidied = float(a["tidied"][0])
         stock.earlier = earlier
         return stock
 
-    def _remove_turn(self, turn: Ints, rows: Ints, geometries: Shapes, chips: list[list[Polygon]], tidy: float) -> None:
+    def _remove_turn(self, turn: Ints, rows: Ints, geometries: Shapes, chips: list[list[Polygon]]) -> None:
         """Remove the shapes numbered ``turn``, each from a different layer."""
         k, row, j, i = self._tiles_under(turn, rows, geometries)
         which = list(zip(k.tolist(), row.tolist(), j.tolist(), i.tolist(), strict=True))
@@ -456,8 +403,6 @@ class LayeredStock:
             row, j, i = np.array([at[1:] for at, _ in cut], dtype=np.int64).T
             self.tiles[row, j, i] = [left[n] for _, n in cut]
             self.cut[row] = True
-            if tidy > 0.0:
-                self._tidy(row, j, i, tidy)
         groups: dict[int, list[int]] = {}
         for (at, *_), n in cut:
             groups.setdefault(at, []).append(n)
@@ -488,21 +433,6 @@ class LayeredStock:
         a0, b0, a1, b1 = shapely.bounds(self.tiles[layer, j, i]).reshape(-1, 4).T
         near = (a0 < x1[of]) & (a1 > x0[of]) & (b0 < y1[of]) & (b1 > y0[of])
         return turn[of][near], layer[near], j[near], i[near]
-
-    def _tidy(self, layer: Ints, j: Ints, i: Ints, tidy: float) -> None:
-        """Simplify tiles that have twice as many vertices as after their last simplification."""
-        many = shapely.get_num_coordinates(self.tiles[layer, j, i]) > self.room[layer, j, i]
-        if not many.any():
-            return
-        layer, j, i = layer[many], j[many], i[many]
-        old = self.tiles[layer, j, i]
-        alike: dict[int, int] = {}
-        same = np.array([alike.setdefault(id(tile), len(alike)) for tile in old], dtype=np.int64)
-        first = np.unique(same, return_index=True)[1]
-        new = simplify_tiles(old[first], self.borders(j[first], i[first]), tidy)[same]
-        self.tiles[layer, j, i] = new
-        self.room[layer, j, i] = np.maximum(2 * shapely.get_num_coordinates(new), ROOM)
-        self.tidied += float(((shapely.area(new) - shapely.area(old)) * self.thickness[layer]).sum())
 
     def _layer(self, layer: int) -> int:
         if not 0 <= layer < self.layers:

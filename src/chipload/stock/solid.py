@@ -9,7 +9,6 @@ faces.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 
 import numpy as np
@@ -122,15 +121,3 @@ def _prism(part: Polygon, z0: float, z1: float) -> tuple[Floats, Ints]:
     vertices = np.vstack([np.column_stack([flat, np.full(size, z)]) for z in (z0, z1)])
     walls = np.vstack([np.column_stack([a, b, b + size]), np.column_stack([a, b + size, a + size])])
     return vertices, np.vstack([base[:, ::-1], base + size, walls]).astype(np.int64)
-
-
-def glb(mesh: trimesh.Trimesh) -> bytes:
-    """Return binary glTF of a mesh in mm with z up; a node converts to the metres and y up of the format."""
-    if not len(mesh.faces):
-        text = b'{"asset": {"version": "2.0"}}   '
-        return struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
-    turn = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1000.0]])
-    scene = trimesh.Scene()
-    scene.add_geometry(mesh, node_name="stock", geom_name="stock", transform=turn / 1000.0)
-    out: bytes = scene.export(file_type="glb")
-    return out

@@ -9,9 +9,8 @@ import pytest
 import shapely
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.chips.covered import covered, covered_rings
+from chipload.engagement.chips.covered import covered
 from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
-from chipload.engagement.chips.section import cutter_numbers
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named
 from engagement.chips.brute import CUTTERS, sections
@@ -161,10 +160,6 @@ def test_along_its_own_leaning_axis(cutter, way, height):
     dense = shapely.unary_union(met)
     assert dense.difference(c.polygon.buffer(2e-3)).area < 1e-9
     assert c.area == pytest.approx(dense.area, rel=3e-3)
-    # another construction: its outline is within the tolerance too
-    other = covered_rings([move], cutter_numbers(CUTTERS[cutter]), [np.array([height])], 1e-3).polygon(0)
-    assert dense.difference(other.buffer(2e-3)).area < 1e-9
-    assert other.area == pytest.approx(dense.area, rel=3e-3)
 
 
 def test_a_rapid_along_a_leaning_axis_ends():

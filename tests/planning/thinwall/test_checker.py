@@ -11,9 +11,9 @@ from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.depth import DepthRange, largest_depths, normal_force
 from chipload.planning.thinwall.paths import PassMotion, program_of, rows_of
 from chipload.planning.thinwall.plane_stock import CutterPose
-from chipload.simulation.chips import remove
 from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
+from layer_oracle.removal import remove_by_layers
 
 STEEL = Material("steel", 1900.0, 600.0, 300.0, 24.0, 20.0, 5.0, source="made up, of the usual size")
 BALL = Cutter(8.0, 2, math.radians(30.0), 20.0, 30.0, 6e5, corner_radius=4.0)
@@ -31,7 +31,7 @@ def simulated(posture: CutterPose, d: float, layers: int, feed: float, spindle: 
     )
     bounds = np.concatenate([[-1.0], np.linspace(-0.008, 0.0, 3)[:-1], np.linspace(0.0, d, layers + 1)])
     stock = LayeredStock.block((-10.0, -12.0, -1.0), (20.0, 12.0, d), bounds, 16.0)
-    c = remove(program, stock, {1: posture.cutter}, STEEL, Resolution(1.0, 0.002, 96, 0.5), engine="layers").columns
+    c = remove_by_layers(program, stock, {1: posture.cutter}, STEEL, Resolution(1.0, 0.002, 96, 0.5)).columns
     k = int(np.flatnonzero(~c["rapid"] & (np.abs(c["x_mm"] - 5.5) < 2.0) & (c["chip_volume_mm3"] > 0.0))[-1])
     return abs(float(c["force_z_mean_n"][k])), float(max(c["force_z_max_n"][k], -c["force_z_min_n"][k]))
 

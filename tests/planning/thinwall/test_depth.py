@@ -14,11 +14,11 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
 from chipload.cutting.force import mean_forces
 from chipload.cutting.material import Material
-from chipload.engagement.immersion.immersion import Section, engagement_rows
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
 from chipload.planning.thinwall.depth import DEEPEST, INFEASIBLE, THRESHOLD, DepthRange, largest_depths, normal_force
 from chipload.planning.thinwall.plane_stock import CutterPose
+from layer_oracle.immersion import Section, engagement_rows
 
 BALL = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=5.0)
 HELICAL = Cutter(10.0, 2, math.radians(30.0), 20.0, 30.0, 6e5, corner_radius=5.0)

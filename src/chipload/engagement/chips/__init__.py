@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 from chipload.lazy import attach
 
 if TYPE_CHECKING:
-    from chipload.engagement.chips.covered import CoveredArea, covered_rings
+    from chipload.engagement.chips.covered import CoveredArea
     from chipload.engagement.chips.move import Move
     from chipload.engagement.chips.ring import Origin, Ring
 
-__all__ = ["CoveredArea", "Move", "Origin", "Ring", "covered_rings"]
+__all__ = ["CoveredArea", "Move", "Origin", "Ring"]
 
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "covered": "CoveredArea covered_rings",
+        "covered": "CoveredArea",
         "move": "Move",
         "ring": "Origin Ring",
     },

@@ -34,12 +34,10 @@ from chipload.engagement.chips.ring import Origin, Ring, ring_of_edges, rings_of
 from chipload.engagement.chips.section import cutter_numbers
 from chipload.errors import InputError
 from chipload.lazy import LateModule
-from chipload.stock.areas import PlaneAreas, areas_of
 
 _section = LateModule("chipload.engagement.chips._section")
 faces = LateModule("chipload.engagement.chips._diagram_faces")
 loop = LateModule("chipload.engagement.chips._boundary")
-straight = LateModule("chipload.engagement.chips._straight_move")
 trace = LateModule("chipload.engagement.chips._grazing_trace")
 
 Floats = NDArray[np.float64]
@@ -147,120 +145,6 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
     return out
 
 
-def covered_rings(moves: Sequence[Move], K: Floats, heights: Sequence[Floats], tolerance: float) -> PlaneAreas:
-    """Return the areas of many layers of many moves, ``heights[m]`` of move m, one after the other; without rings where
-    the move is never in the layer.
-
-    One loop over all of them without the interpreter: in threads it costs no more than the areas do.
-
-    Parameters
-    ----------
-    K : of :func:`chipload.engagement.chips.section.cutter_numbers`
-    """
-    levels = np.concatenate([np.empty(0), *heights])
-    first = np.cumsum([0, *(len(h) for h in heights)])
-    fixed = np.array([_is_straight(move, K) for move in moves], dtype=np.bool_)
-    along = {
-        m: found
-        for m in np.flatnonzero(~fixed).tolist()
-        if (found := _as_upright_move(moves[m], K, tolerance)) is not None
-    }
-    turning = ~fixed
-    turning[list(along)] = False
-    shapes = dict[int, Shape | None]()
-    for m, standing in along.items():
-        for k in range(first[m], first[m + 1]):
-            area = _standing_area(*standing, float(levels[k]), tolerance)
-            shapes[k] = None if area is None else area.polygon
-    points, count = _outlines(moves, K, heights, fixed, tolerance)
-    at = np.flatnonzero(np.repeat(fixed, np.diff(first)))
-    loops, ends, general = _single_loop_layers(moves, K, heights, turning, tolerance)
-    shapes |= general
-    # both tables in the order of their points
-    which = np.concatenate([at[count > 0], np.array(list(ends), dtype=np.int64)])
-    size = np.concatenate([count[count > 0], np.array([n for _, n in ends.values()], dtype=np.int64)])
-    begin = np.concatenate(
-        [np.cumsum(count[count > 0]) - count[count > 0], [len(points) + a for a, _ in ends.values()]]
-    )
-    table = np.column_stack([begin, size]).astype(np.int64)
-    return _plane_areas(np.concatenate([points, loops]), table, which, shapes, len(levels))
-
-
-def _is_straight(move: Move, K: Floats) -> bool:
-    """Whether a convex cutter without the flank arc of a barrel goes straight with a fixed axis that leans, or with a
-    pointed bottom.
-    """
-    if len(move.tip) > 2 or move.axis[1:].any() or min(K[0], K[5], K[8]) < 0.0 or K[13] > 0.0:
-        return False
-    return bool(move.axis[0, :2].any() or K[5] > 0.0)
-
-
-def _outlines(
-    moves: Sequence[Move], K: Floats, heights: Sequence[Floats], some: NDArray[np.bool_], tolerance: float
-) -> tuple[Floats, Ints]:
-    """Outlines of the layers of ``some`` moves, which are straight: points, and how many of each layer."""
-    which = np.flatnonzero(some).tolist()
-    levels = np.concatenate([np.empty(0), *(heights[m] for m in which)])
-    first = np.cumsum([0, *(len(heights[m]) for m in which)])
-    if not len(levels):
-        return np.empty((0, 2)), np.empty(0, dtype=np.int64)
-    tips, axes = (
-        _fill_coefficients([moves[m].tip for m in which]),
-        _fill_coefficients([moves[m].axis for m in which])[:, 0],
-    )
-    axes = axes / np.linalg.norm(axes, axis=1)[:, None]
-    half = tips[:, 1] if tips.shape[1] > 1 else np.zeros((len(which), 3))
-    out, count = np.empty((max(2048, 128 * len(levels)), 2)), np.empty(len(levels), dtype=np.int64)
-    start = np.ascontiguousarray(tips[:, 0] - half)
-    while straight.outlines(start, 2.0 * half, axes, np.array(K), levels, first, tolerance, out, count) < len(levels):
-        if 4 * len(out) > _MOST_EDGES:
-            raise InputError("covered: the boundary has more than four million edges: make the tolerance larger")
-        out = np.empty((4 * len(out), 2))
-    return out[: int(count.clip(0).sum())], count
-
-
-def _single_loop_layers(
-    moves: Sequence[Move], K: Floats, heights: Sequence[Floats], some: NDArray[np.bool_], tolerance: float
-) -> tuple[Floats, dict[int, tuple[int, int]], dict[int, Shape | None]]:
-    """Layers of ``some`` moves whose boundary is one loop: points, and the first and the number of those of each layer;
-    and the shapes of the others.
-    """
-    first = np.cumsum([0, *(len(h) for h in heights)])
-    which = np.flatnonzero(some).tolist()
-    own = [moves[m] for m in which]
-    starts = np.cumsum([0, *(len(heights[m]) for m in which)])
-    levels = np.concatenate([np.empty(0), *(heights[m] for m in which)])
-    at = np.flatnonzero(np.repeat(some, np.diff(first))).tolist()
-    buffer, count, knots, whole = _loops(own, K, levels, starts, tolerance)
-    rings, shapes = dict[int, tuple[int, int]](), dict[int, Shape | None]()
-    simple = np.flatnonzero(count >= 0)
-    end = np.cumsum(count[simple])
-    for i, a, n in zip(simple.tolist(), (end - count[simple]).tolist(), count[simple].tolist(), strict=True):
-        if whole[i]:
-            rings[at[i]] = (a, n)
-        else:
-            shapes[at[i]] = _thick(_untangle_loop(shapely.Polygon(buffer[a : a + n, :2])), tolerance)
-    for i in np.flatnonzero(count == trace.GENERAL).tolist():
-        move, h = own[int(np.searchsorted(starts, i, "right")) - 1], float(levels[i])
-        edges = _candidates(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i])))
-        found = _noded_shape(edges, move, K, h, tolerance)
-        shapes[at[i]] = None if found is None else _thick(found, tolerance)
-    return buffer[: int(end[-1]) if len(end) else 0, :2], rings, shapes
-
-
-def _plane_areas(points: Floats, table: Ints, which: Ints, shapes: dict[int, Shape | None], count: int) -> PlaneAreas:
-    """Areas of ``count`` layers: those of ``which`` have the rings ``table``, some a shape, the others none."""
-    first = np.zeros((count, 2), dtype=np.int64)
-    first[which] = np.arange(len(which))[:, None] + np.array([0, 1])
-    more = [k for k, shape in shapes.items() if shape is not None]
-    if more:
-        added = areas_of([shapes[k] for k in more])
-        first[more] = added.first + len(table)
-        table = np.concatenate([table, added.rings + np.array([len(points), 0])])
-        points = np.concatenate([points, added.points])
-    return PlaneAreas(points, table, first)
-
-
 def _as_upright_move(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | None:
     """A cylinder that moves along its own leaning axis as a longer one that stands at the lower end, or None.
 
@@ -320,18 +204,6 @@ def _fill_coefficients(coefficients: Sequence[Floats]) -> Floats:
 def _untangle_loop(loop: shapely.Polygon) -> Shape:
     """Return the area that a counter-clockwise loop, which may cross itself, surrounds at least once."""
     return cast(Shape, shapely.buffer(loop, 0.0))
-
-
-def _thick(shape: Shape, tolerance: float) -> Shape:
-    """Without holes and specks that are no wider than the polygon's own error."""
-    parts = [p for p in shapely.get_parts(shape) if p.area > 2.0 * tolerance * p.exterior.length]
-    if not parts:
-        return shape
-    made = [
-        shapely.Polygon(p.exterior, [q for q in p.interiors if shapely.Polygon(q).area > 2.0 * tolerance * q.length])
-        for p in parts
-    ]
-    return cast(Shape, made[0] if len(made) == 1 else shapely.MultiPolygon(made))
 
 
 def _larger(buffer: Floats) -> Floats:
@@ -426,6 +298,5 @@ __all__ = [
     "candidates",
     "covered",
     "covered_areas",
-    "covered_rings",
     "whole_section",
 ]

@@ -45,16 +45,6 @@ def cutter_numbers(cutter: Cutter) -> Floats:
     return out
 
 
-def lengthen_flutes(K: Floats, length: float) -> Floats:
-    """The numbers of a cutter whose flutes extend to another length [mm] along its flank."""
-    out = K.copy()
-    out[10], out[11] = length, K[9] + length * K[8]
-    if K[13] > 0.0 and length < K[14] - K[13] * K[6]:
-        out[11] = K[12] + math.sqrt(K[13] ** 2 - (K[14] - length) ** 2)
-    out.setflags(write=False)
-    return out
-
-
 @dataclass(frozen=True, eq=False)
 class SectionEdge:
     """Points of the edge of a section.

@@ -13,11 +13,10 @@ from chipload.jobs.contour.text_simulation import SimulatedText
 from chipload.machine.machine import Machine
 from chipload.planning.result import OperationResult
 from chipload.result import Provenance, Verdict
-from chipload.simulation.accuracy import FLOOR
 
 #: relative error of planned loads: the rotations at which a peak is sampled, as in simulation.accuracy
 PLANNED_ERRORS = dict.fromkeys(
-    ("force_n", "force_xy_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm", "form_error_um"), FLOOR
+    ("force_n", "force_xy_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm", "form_error_um"), 0.01
 )
 
 

@@ -15,8 +15,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.program.program import Program
 from chipload.simulation.accuracy import AXIAL, COMPARABLE, COMPARED, axial_force
-from chipload.simulation.chips import resolution_error_of, setting_of, with_engine
-from chipload.simulation.removal import Removal, Resolution
+from chipload.simulation.chips import resolution_error_of, with_moves
+from chipload.simulation.removal import Removal, Resolution, RunSettings
 from chipload.stock.layers import LayeredStock
 
 
@@ -44,8 +44,8 @@ def load_error(
     """
     names = (*COMPARED, AXIAL) if floors else COMPARABLE
     columns = {**removal.columns, AXIAL: axial_force(removal.columns)}
-    setting = setting_of(cutters, material, resolution, None, 1)
-    setting = with_engine("moves", setting, program, before)
+    setting = RunSettings(cutters, material, resolution, None, 1)
+    setting = with_moves(setting, program, before)
     found = resolution_error_of(program, before, columns, setting, names)[0]
     out = {name: found[name] for name in names}
     if floors:  # a floor moves under the lateral force as well

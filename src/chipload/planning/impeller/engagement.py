@@ -22,8 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
-from chipload.engagement.immersion.immersion import tool_frame
-from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.engagement.tooth_engagement import ToothEngagement, tool_frame
 from chipload.errors import InputError
 from chipload.lazy import LateModule, scipy
 from chipload.planning.impeller.scene import Floats

@@ -33,8 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
-from chipload.engagement.immersion.immersion import tool_frame
-from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.engagement.tooth_engagement import ToothEngagement, tool_frame
 from chipload.errors import InputError
 from chipload.planning.thinwall.depth_range import depths_in_range
 

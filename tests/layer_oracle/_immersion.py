@@ -1,6 +1,6 @@
 """Compiled loops of the immersion; arrays and scalars only.
 
-Notation as in :mod:`chipload.engagement.immersion.immersion`: phi immersion, u = cos(phi) n + sin(phi) T, a sinusoid
+Notation as in :mod:`layer_oracle.immersion`: phi immersion, u = cos(phi) n + sin(phi) T, a sinusoid
 a cos(phi) + b sin(phi) + c is written (a, b, c); p a point of the edge, q the point of the cutter's surface uphill or
 downhill of it at the height of a section. ``slices`` (k, 9): s from, s to, rho, z at the middle, sin kappa, cos kappa,
 z at s from and to, radius of the arc (0: straight).
@@ -97,10 +97,10 @@ def layer_of(z, bounds):
 @njit(cache=True, nogil=True)
 def layer_below(z, bounds):
     """The layer whose section lies next below z, the lowest one where there is none; -1 outside the layers."""
-    l = layer_of(z, bounds)
-    if l > 0 and z < 0.5 * (bounds[l] + bounds[l + 1]):
-        l -= 1
-    return l
+    row = layer_of(z, bounds)
+    if row > 0 and z < 0.5 * (bounds[row] + bounds[row + 1]):
+        row -= 1
+    return row
 
 
 @njit(cache=True, nogil=True)
@@ -239,10 +239,10 @@ def band(
         if kept:
             onto = has and (always or hq[1] * si + hq[0] * co + hq[2] > 0.0)
             wide = q[0] if onto else rho
-            l = layer if onto else under
+            row = layer if onto else under
             x = mid[0] + wide * (co * flat[0, 0] + si * flat[1, 0])
             y = mid[1] + wide * (co * flat[0, 1] + si * flat[1, 1])
-            kept = covers(x, y, edges, start[l], start[l + 1])
+            kept = covers(x, y, edges, start[row], start[row + 1])
         if not kept:
             opened = -1
             continue
@@ -275,13 +275,13 @@ def upright(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
         else:
             first = max(int(np.searchsorted(bounds, bottom, side="right")) - 1, 0)
             last = min(int(np.searchsorted(bounds, top, side="left")), len(bounds) - 1)
-        for l in range(first, last):
+        for row in range(first, last):
             s_from, s_to = slices[k, 0], slices[k, 1]
             if not level:
-                at_height(slices[k], max(bounds[l], bottom) - tip[2], low)
-                at_height(slices[k], min(bounds[l + 1], top) - tip[2], high)
-                s_from = s_from if bottom >= bounds[l] else low[0]
-                s_to = s_to if top <= bounds[l + 1] else high[0]
+                at_height(slices[k], max(bounds[row], bottom) - tip[2], low)
+                at_height(slices[k], min(bounds[row + 1], top) - tip[2], high)
+                s_from = s_from if bottom >= bounds[row] else low[0]
+                s_to = s_to if top <= bounds[row + 1] else high[0]
                 if s_to - s_from <= 0.0:
                     continue
             r = slices[k, 8]
@@ -295,7 +295,7 @@ def upright(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
             elif not level:
                 place[1] = slices[k, 2] + off * place[3]
             total = band(
-                tip, frame, speed, turn, slices[k], k, l, place, s_from, s_to, widest, bounds, start, edges, breaks,
+                tip, frame, speed, turn, slices[k], k, row, place, s_from, s_to, widest, bounds, start, edges, breaks,
                 rows, owner, total,
             )  # fmt: skip
             if total < 0:
@@ -316,10 +316,10 @@ def meets(phi, tip, frame, speed, turn, slice_, bounds, start, edges):
         nu[i] = sk * u - ck * frame[2, i]
     v = speed + np.cross(turn, p)
     height = tip[2] + p[2]
-    l = layer_of(height, bounds)
-    if l < 0:
+    row = layer_of(height, bounds)
+    if row < 0:
         return False
-    dz = 0.5 * (bounds[l] + bounds[l + 1]) - height
+    dz = 0.5 * (bounds[row] + bounds[row + 1]) - height
     x, y = tip[0] + p[0], tip[1] + p[1]
     flat = math.hypot(nu[0], nu[1])
     found = False
@@ -336,9 +336,9 @@ def meets(phi, tip, frame, speed, turn, slice_, bounds, start, edges):
         if found:
             x += shift * nu[0] / flat
             y += shift * nu[1] / flat
-            return covers(x, y, edges, start[l], start[l + 1])
-    l = layer_below(height, bounds)
-    return covers(x, y, edges, start[l], start[l + 1])
+            return covers(x, y, edges, start[row], start[row + 1])
+    row = layer_below(height, bounds)
+    return covers(x, y, edges, start[row], start[row + 1])
 
 
 @njit(cache=True, nogil=True)
@@ -402,7 +402,7 @@ def step_engagement(tip, frame, speed, turn, slices, bounds, start, edges, rows,
     too few.
 
     ``frame`` rows T, n, A; ``speed`` (3,) of the tip and ``turn`` (3,) of the axis over one tooth period; the layers
-    between ``bounds`` have the edges start[l] .. start[l + 1] - 1.
+    between ``bounds`` have the edges start[row] .. start[row + 1] - 1.
     """
     if math.hypot(frame[2, 0], frame[2, 1]) < UPRIGHT:
         return upright(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)

@@ -25,18 +25,17 @@ Differs from source: h is to first order in the feed per tooth, the path of a to
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.slices import Slices
 from chipload.errors import InputError
-from chipload.lazy import LateModule
-
-_immersion = LateModule("chipload.engagement.immersion._immersion")
+from chipload.stock.layers import LayeredStock
+from layer_oracle import _immersion
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -59,27 +58,20 @@ class Section:
     edges: Floats
 
 
-def tool_frame(axis: ArrayLike, toward: ArrayLike, clockwise: bool = True) -> Floats:
-    """Return the tool frame (3, 3), rows T, n, A: T the direction ``toward`` (3,) across the unit axis (3,), n left of
-    it (right if the spindle turns counter-clockwise). Where ``toward`` is parallel to the axis, T is any direction
-    across it.
-
-    >>> tool_frame([0, 0, 1], [3, 0, 4]).tolist()
-    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+def edges_under(stock: LayeredStock, layers: range, low: ArrayLike, high: ArrayLike) -> Section:
+    """The edges of neighbouring layers under a rectangle between the corners ``low`` and ``high`` (2,) [mm]; those that
+    no ray along +x from the rectangle meets are left out.
     """
-    ax, ay, az = np.asarray(axis, dtype=np.float64).tolist()
-    vx, vy, vz = np.asarray(toward, dtype=np.float64).tolist()
-    along = vx * ax + vy * ay + vz * az
-    tx, ty, tz = vx - along * ax, vy - along * ay, vz - along * az
-    size = math.sqrt(tx * tx + ty * ty + tz * tz)
-    if size <= 1e-12 * math.sqrt(vx * vx + vy * vy + vz * vz) or size == 0.0:
-        least = int(np.argmin(np.abs([ax, ay, az])))
-        tx, ty, tz = (float(i == least) - (ax, ay, az)[least] * a for i, a in enumerate((ax, ay, az)))
-        size = math.sqrt(tx * tx + ty * ty + tz * tz)
-    tx, ty, tz = tx / size, ty / size, tz / size
-    hand = 1.0 if clockwise else -1.0
-    n = [hand * (ay * tz - az * ty), hand * (az * tx - ax * tz), hand * (ax * ty - ay * tx)]
-    return np.array([[tx, ty, tz], n, [ax, ay, az]]) + 0.0
+    (x0, y0), (_, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    found = []
+    for i in layers:
+        rings = shapely.get_rings(shapely.get_parts(stock.section(i, low, high)))
+        points, ring = shapely.get_coordinates(rings, return_index=True)
+        edges = np.hstack([points[:-1], points[1:]])[ring[1:] == ring[:-1]]
+        x, y = edges[:, ::2], edges[:, 1::2]
+        found.append(edges[(x.max(axis=1) >= x0) & (y.max(axis=1) >= y0) & (y.min(axis=1) <= y1)])
+    start = np.cumsum([0, *(len(e) for e in found)])
+    return Section(stock.bounds[layers.start : layers.stop + 1], start, np.concatenate([np.empty((0, 4)), *found]))
 
 
 @lru_cache(maxsize=64)
@@ -110,7 +102,7 @@ def engagement_rows(
     Parameters
     ----------
     tip : (3,) float [mm]
-    frame : (3, 3) rows T, n, A, see :func:`tool_frame`; A points up: A_z > 0
+    frame : (3, 3) rows T, n, A, see :func:`chipload.engagement.tooth_engagement.tool_frame`; A points up: A_z > 0
     feed : V, (3,) float [mm] that the tip moves while the spindle turns by one tooth
     turn : W, (3,) float [rad] that the axis turns in that time
     cutter : its slices

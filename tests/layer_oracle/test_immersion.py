@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import Slices, slices
-from chipload.engagement.immersion.immersion import Section, engagement_rows, tool_frame
+from chipload.engagement.tooth_engagement import tool_frame
 from chipload.errors import InputError
+from layer_oracle.immersion import Section, engagement_rows
 
 Floats = NDArray[np.float64]
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
