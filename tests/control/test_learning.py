@@ -63,6 +63,17 @@ def test_what_power_does_not_tell_stays(log, program):
     assert np.linalg.eigvalsh(found.variances).min() > 0.0
 
 
+@pytest.mark.parametrize(("error", "most", "least"), [(0.05, 0.054, 0.8), (0.0, 0.022, -1.0)])
+def test_share_of_the_efficiency(log, program, error, most, least):
+    """Five percent of efficiency are nearly all that is not known of the torque; none where it is known."""
+    found = learn_material([blocks(log, program)], Signal(SignalKind.POWER, 1.0 / EFFICIENCY, error), PRIOR)
+    deviation, share = found.torque_known
+    assert 0.95 * error < deviation < most
+    assert least < share <= 1.0
+    if error == 0.0:
+        assert share < 0.01
+
+
 def test_clock_and_override(program):
     """The clock of a log is found, and an override that the log states is taken out of it."""
     log = power_log(np.random.default_rng(7), TRUTH, program, 0.0, IDLE)

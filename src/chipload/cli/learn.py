@@ -210,6 +210,14 @@ def lines_of(found: LearnedMaterial) -> list[str]:
             f"{number_text(200.0 * before[k], 2)} % (two standard deviations)"
         )
     out.append("Krc, Kac, Kre, Kae: as before: power and current tell the tangential force alone")
+    deviation, share = found.torque_known
+    if share > 0.5:
+        what = "efficiency" if found.gain.signal == "power" else "torque constant"
+        out.append(
+            f"the torque of such cuts: +- {number_text(200.0 * deviation, 2)} %; {100.0 * share:.0f} % of that "
+            f"variance is the {what} of the spindle, which more logs do not tell: cuts of known "
+            "torque do (chipload spindle)"
+        )
     for key, error in found.fit_error.items():
         out.append(f"{key}: its cut takes {share_text(error)} than the new coefficients predict")
     out.append(f"{found.used} blocks used, {found.left_out} left out")

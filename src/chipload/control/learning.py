@@ -176,6 +176,19 @@ class LearnedMaterial:
         before, after = (np.sqrt(np.diagonal(tangential_shares(m))) for m in (self.prior, self.material))
         return (float(before[0]), float(before[1])), (float(after[0]), float(after[1]))
 
+    @property
+    def torque_known(self) -> tuple[float, float]:
+        """Relative standard deviation of the torque that the logs tell best, and the share of the efficiency, or of
+        the torque constant, in its variance: w'Vw of Ktc and Kte with the weights w that make it least.
+        """
+        shares = tangential_shares(self.material)
+        weights = np.linalg.pinv(shares, hermitian=True).sum(axis=1)
+        weights /= weights.sum()
+        variance = float(weights @ shares @ weights)
+        common = float(weights @ np.array([self.gain.with_ktc, self.gain.with_kte]))
+        rest = self.gain.deviation**2 * variance
+        return math.sqrt(variance), min(common**2 / rest, 1.0) if rest > 0.0 else 0.0
+
 
 class _SpindleModel:
     """Parameters of several logs in one vector, with their priors, and the prediction of every block."""
