@@ -166,10 +166,13 @@ def true_loads(cut: Cut, K, rotations=360, slices=None):
         slices = int(min(max(400 * lag / math.acos(max(1.0 - cut.ae / R, -1.0)), 200), 6000))
     wall = R - cut.ae
     low, high = (wall, 10.0 * R) if cut.up else (-10.0 * R, -wall)
+    table = cut.slices(slices)
+    # a slice that does not reach the material has no load
+    table = table[table[:, 0] + cut.e > wall]
     F, T, H = np.zeros((rotations, 3)), np.zeros(rotations), np.zeros(rotations)
     turns = TAU * np.arange(rotations) / rotations
     c = cut.N * cut.fz / TAU
-    loads(cut.slices(slices), cut.pitches, c, cut.e, cut.lam, low, high, np.array(K[:6], float), turns, F, T, H)
+    loads(table, cut.pitches, c, cut.e, cut.lam, low, high, np.array(K[:6], float), turns, F, T, H)
     return np.array([np.linalg.norm(F, axis=1).max(), T.max(), T.mean(), H.max()])
 
 
