@@ -357,8 +357,8 @@ def line_times(reading: ProgramReading, machine: Machine) -> tuple[Ints, Floats]
     count = max(int(own.max(initial=0)), int(reading.commands.line.max(initial=0))) + 1
     named = np.zeros(count, dtype=np.bool_)
     named[own] = named[reading.commands.line] = True
-    lines = np.flatnonzero(named)
-    return lines, np.bincount(own, times_of(reading, machine), count)[lines]
+    lines = np.flatnonzero(named).astype(np.int64)
+    return lines, np.asarray(np.bincount(own, times_of(reading, machine), count)[lines], dtype=np.float64)
 
 
 def read_tools(path: str | Path) -> ToolTable:

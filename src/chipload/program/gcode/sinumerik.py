@@ -122,7 +122,7 @@ class Sinumerik(Dialect):
             c.named_texts[named_text[1]] = named_text[2].strip()
             return None
         for name, meaning in c.named_texts.items():
-            body = re.sub(rf"(?<![A-Z0-9_]){name}(?![A-Z0-9_(=])", lambda _, text=meaning: text, body)
+            body = re.sub(rf"(?<![A-Z0-9_]){name}(?![A-Z0-9_(=])", meaning.replace("\\", r"\\"), body)
         body = without_blanks(body)
         call = _CALL.match(body)
         if call:
