@@ -9,6 +9,7 @@ Processor seconds, so that other work on the computer counts little; memory is t
   the verdict is shown;
 - how much faster the kernel is on 2 and 4 threads with a core each: its processor time over that of its busiest thread
   and of the main thread, which works for all (``--threads`` alone, with ``--moves``);
+- the time of the height map that checks of the stock follow (``--heights`` alone);
 - the exponent of time over the number of moves, and time and memory of a further move in a job.
 
 ``--quick``: 1,000 and 5,000 moves, about a minute of processor time; start and report are then most of a job, and only
@@ -33,6 +34,7 @@ from pathlib import Path
 from typing import ClassVar, NamedTuple
 from unittest.mock import patch
 
+import numpy as np
 from engine_programs import made
 from engines import ALLOY
 
@@ -44,6 +46,8 @@ from chipload.program.apt.writer import write_apt
 from chipload.program.release import Release
 from chipload.simulation import strips
 from chipload.simulation.chips import remove
+from chipload.simulation.heights.height_map import follow_heights, pitch_of
+from chipload.simulation.steps import StepBlocks
 from chipload.stock.layers import LayeredStock
 
 #: goals: check [s], a job over its kernel, memory of the longest job [MB]; by how much a goal may be missed
@@ -51,6 +55,7 @@ CHECK_S, OVER_KERNEL, MEMORY_MB, MISSED = 0.4, 2.0, 400.0, 1.2
 NAMES = ("roughing", "finishing", "five axes")
 #: goals of the contact and the loads of a move [us]; longest step of the jobs [mm]
 KERNEL_US, STEP_MM = {"finishing": 20.0, "five axes": 300.0}, 1.0
+TOLERANCE_MM = 1e-3
 QUICK, WHOLE = (1_000, 5_000), (10_000, 100_000)
 #: moves below which start and report are most of a job, so that no goal of time is stated
 SHORT = 50_000
@@ -190,6 +195,17 @@ def kernel(name: str, moves: int, workers: int = 1) -> float:
     return time.process_time() - begun
 
 
+def height_map(name: str, moves: int) -> float:
+    """Processor seconds of the stock as a height map under the moves of an upright program."""
+    case = made(name, moves)
+    stock = LayeredStock.block(case.low, case.high, 4.0 * case.layer_mm, 40.0)
+    pitch = pitch_of(np.array(case.low), np.array(case.high), case.cutters)
+    steps = StepBlocks(case.program, STEP_MM, TOLERANCE_MM)
+    begun = time.process_time()
+    follow_heights(steps, case.cutters, stock, pitch, TOLERANCE_MM)
+    return time.process_time() - begun
+
+
 class TimedThread(ThreadPoolExecutor):
     """A thread of a simulation that states its processor seconds in ``times`` when it ends."""
 
@@ -300,7 +316,16 @@ def main() -> None:
     ask.add_argument("--moves", type=int, nargs="+", default=None, help="lengths of the programs, ascending")
     ask.add_argument("--names", nargs="+", choices=NAMES, default=NAMES, help="programs")
     ask.add_argument("--threads", action="store_true", help="only the kernel on 2 and 4 threads")
+    ask.add_argument("--heights", action="store_true", help="only the height map of upright programs")
     given = ask.parse_args()
+    if given.heights:
+        table = list[Row]()
+        for name in (name for name in given.names if name != "five axes"):
+            height_map(name, 300)
+            n = min(given.moves or (4_000,))
+            table.append(Row(f"{name}, {n} moves: height map", math.nan, 1e6 * height_map(name, n) / n, "us a move"))
+        print_table(table)
+        return
     if given.threads:
         table = [row for n in given.moves or (20_000,) for name in given.names for row in thread_rows(name, n)]
         print_table(table)
