@@ -33,7 +33,7 @@ def run(tips: Floats, axes: Floats, cutter: Cutter, stock: LayeredStock, k: floa
 
 @pytest.mark.parametrize(("cutter", "seed"), [(FLAT, 11), (BALL, 12)], ids=["flat", "ball"])
 def test_a_rigid_motion_leaves_volumes_and_turns_forces(cutter: Cutter, seed: int) -> None:
-    """The job moved and turned about z by an angle of no meaning: only the tiles lie otherwise."""
+    """The job moved and turned about z by an angle of no meaning: only the cells of the index lie otherwise."""
     tips, axes = walk(seed, 5)
     mesh = trimesh.creation.box(bounds=[LOW, HIGH])
     angle, shift = 0.7, np.array([310.0, -45.0, 12.5])
@@ -45,7 +45,7 @@ def test_a_rigid_motion_leaves_volumes_and_turns_forces(cutter: Cutter, seed: in
     force, turned = (np.column_stack([c[name] for name in FORCES]) for c in (a, b))
     np.testing.assert_allclose(b["chip_volume_mm3"], a["chip_volume_mm3"], atol=2e-4 * a["chip_volume_mm3"].max())
     assert b["chip_volume_mm3"].sum() == pytest.approx(a["chip_volume_mm3"].sum(), rel=5e-5)
-    np.testing.assert_allclose(turned, force @ turn.T, atol=3e-4 * np.abs(force).max())
+    np.testing.assert_allclose(turned, force @ turn.T, atol=1e-3 * np.abs(force).max())
     np.testing.assert_allclose(b["torque_mean_nm"], a["torque_mean_nm"], atol=1e-3 * a["torque_mean_nm"].max())
 
 
