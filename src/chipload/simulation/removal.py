@@ -175,7 +175,8 @@ class RunSettings:
     @property
     def run(self) -> MoveRun:
         """The run of the program."""
-        assert self.moves is not None
+        if self.moves is None:
+            raise ValueError("the settings hold no run yet: see chipload.simulation.chips.with_moves")
         return self.moves
 
     @property

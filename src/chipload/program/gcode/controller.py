@@ -17,6 +17,7 @@ from chipload.program.control import Control, control_named
 from chipload.program.corners import Corner, Piece, join_corner
 from chipload.program.corners import turns as turns_at
 from chipload.program.gcode import arcs
+from chipload.program.gcode.cycles import PeckRule
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.parameters import Parameters
 from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, Nine, PointMemory, State, nine
@@ -138,9 +139,8 @@ class Controller:
         self.program_frame: ProgramFrame | None = None
         #: where a retraction to where only the machine knows was left out
         self.retracted: Nine | None = None
-        #: by what each peck of a hole is shorter than the one before it, the least, and the depth after which G73 lifts
-        #: the drill to R, 0: it does not [units of the text]
-        self.pecks = 0.0, 0.0, 0.0
+        #: how the pecks of a hole change
+        self.pecks = PeckRule()
         #: depth of a peck of tapping [units of the text]; 0: in one go
         self.tap_peck = 0.0
         #: rounds every corner (RNDM of a Sinumerik)

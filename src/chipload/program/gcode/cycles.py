@@ -11,7 +11,8 @@ Reference: LinuxCNC 2.9, "Canned Cycles Motion".
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from chipload.errors import InputError
 from chipload.program.commands import DWELL, LINE, RAPID
@@ -34,12 +35,22 @@ MOST_PECKS = 100_000
 Step = tuple[int, float, float, float, float]
 
 
+class PeckRule(NamedTuple):
+    """How the pecks of a hole change [units of the text].
+
+    ``shorter``: each peck is by that shorter than the one before it, and at least ``least`` where it is.
+    ``lift``: after that depth G73 goes to R; 0: it does not.
+    """
+
+    shorter: float = 0.0
+    least: float = 0.0
+    lift: float = 0.0
+
+
 @dataclass(frozen=True)
 class Hole:
     """Numbers of one hole [units of the text, s]; ``sense`` of the spindle: 1, -1 or 0.
 
-    ``shorter``: each peck is by that shorter than the one before it, and at least ``least`` where it is.
-    ``lift``: after that depth G73 goes to R; 0: it does not.
     ``out``: height up to which G74, G84 and G89 go at their feed, then at rapid to ``clear``; None: at feed to there.
     ``shift`` [mm] and ``middle`` of G87; ``back`` is RETURN in units of the text.
     """
@@ -53,9 +64,7 @@ class Hole:
     shift: tuple[float, float] = (0.0, 0.0)
     middle: float = 0.0
     back: float = RETURN
-    shorter: float = 0.0
-    least: float = 0.0
-    lift: float = 0.0
+    pecks: PeckRule = field(default_factory=PeckRule)
     out: float | None = None
 
 
@@ -128,22 +137,23 @@ def _pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         raise InputError(f"Q{hole.peck:g}: the depth of a peck must be above 0")
     if (hole.r - hole.bottom) / hole.peck > MOST_PECKS:
         raise InputError(f"Q{hole.peck:g}: makes more than {MOST_PECKS} pecks: raise it")
-    if hole.shorter < 0.0 or (hole.shorter > 0.0 and not 0.0 < hole.least <= hole.peck):
+    shorter, least, lift = hole.pecks
+    if shorter < 0.0 or (shorter > 0.0 and not 0.0 < least <= hole.peck):
         raise InputError(
-            f"I{hole.peck:g} J{hole.shorter:g} K{hole.least:g}: pecks become shorter by J, 0 or more, down to K, which "
-            "must be above 0 and at most I"
+            f"I{hole.peck:g} J{shorter:g} K{least:g}: pecks become shorter by J, 0 or more, down to K, which must be "
+            "above 0 and at most I"
         )
-    if hole.shorter > 0.0 and (hole.r - hole.bottom) / hole.least > MOST_PECKS:
-        raise InputError(f"K{hole.least:g}: makes more than {MOST_PECKS} pecks: raise it")
+    if shorter > 0.0 and (hole.r - hole.bottom) / least > MOST_PECKS:
+        raise InputError(f"K{least:g}: makes more than {MOST_PECKS} pecks: raise it")
     peck, lift_level = hole.peck, hole.r
     depth = hole.r - peck
     while depth > hole.bottom:
         yield LINE, a, b, depth, 0.0
-        if code == 830 or 0.0 < hole.lift <= lift_level - depth + 1e-9:
+        if code == 830 or 0.0 < lift <= lift_level - depth + 1e-9:
             lift_level = depth
             yield RAPID, a, b, hole.r, 0.0
         yield RAPID, a, b, depth + hole.back, 0.0
-        peck = max(peck - hole.shorter, hole.least) if hole.shorter > 0.0 else peck
+        peck = max(peck - shorter, least) if shorter > 0.0 else peck
         depth -= peck
     yield LINE, a, b, hole.bottom, 0.0
 

@@ -239,6 +239,6 @@ class Drilling:
             shift,
             middle,
             cycles.RETURN / scale,
-            *(self.c.pecks if code in cycles.NEED_Q else (0.0, 0.0, 0.0)),
+            self.c.pecks if code in cycles.NEED_Q else cycles.PeckRule(),
             out=r if self.c.control.cycles.feeds_to_r else None,
         )

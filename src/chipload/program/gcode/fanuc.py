@@ -27,7 +27,7 @@ from chipload.errors import InputError
 from chipload.program.corners import Corner
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.coordinates import change_coordinates
-from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_Q
+from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_Q, PeckRule
 from chipload.program.gcode.dialect import UNREAD, Dialect, NotReadError, go_on, leave_out, lenient
 from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.frames import remove, turn_about
@@ -316,7 +316,7 @@ class Fanuc(Dialect):
                 # an Okuma repeats by Q, but for the pecks of G83 and G73, whose depth may also be I
                 if "i" in words and "q" not in words:
                     words["q"] = words.pop("i")
-                    c.pecks = 0.0, 0.0, words.pop("j", 0.0) if motion == PECKS_WITHOUT_LIFT else 0.0
+                    c.pecks = PeckRule(lift=words.pop("j", 0.0) if motion == PECKS_WITHOUT_LIFT else 0.0)
             elif repeat in words and repeat != "l":
                 words["l"] = words.pop(repeat)
             if "p" in words and 40 not in g and 98 not in block.m:
@@ -333,10 +333,10 @@ class Fanuc(Dialect):
             if "q" in words:
                 raise NotReadError(f"{code_text(motion)}: I with Q: pecks that retract after a depth Q")
             words["q"] = words.pop("i")
-            c.pecks = words.pop("j", 0.0), words.pop("k", 0.0), 0.0
+            c.pecks = PeckRule(words.pop("j", 0.0), words.pop("k", 0.0))
         elif any(code in CYCLES for code in g) or "q" in words:
             has_lift = c.control.cycles.repeat_letter == "l" and motion == PECKS_WITHOUT_LIFT
-            c.pecks = 0.0, 0.0, words.pop("k", 0.0) if has_lift else 0.0
+            c.pecks = PeckRule(lift=words.pop("k", 0.0) if has_lift else 0.0)
 
     @staticmethod
     def _pecks_of_taps(words: dict[str, float], g: list[int], motion: int, c: Controller) -> None:
