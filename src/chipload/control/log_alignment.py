@@ -231,9 +231,10 @@ def _time_by_line(name: str, line: Floats, clock: Floats, predicted: PredictedTo
     lasts = np.diff(then) > 0.0
     longer = float(np.median(np.diff(at)[lasts] / np.diff(then)[lasts])) if lasts.any() else 1.0
     if not 1.0 / MOST_LONGER < longer < MOST_LONGER:
+        unit = 10.0 ** round(math.log10(longer))
         raise InputError(
             f"{name}: half of its lines last {number_text(longer)} times as long as calculated, at most "
-            f"{MOST_LONGER:g} times is believed: check the unit of its time (a factor of {10.0 ** round(math.log10(longer)):g})"
+            f"{MOST_LONGER:g} times are believed: check the unit of its time (a factor of {unit:g})"
         )
     out = np.interp(clock, at, then, left=-1.0)
     # the last line ends when the history does, at the pace of the lines before it
