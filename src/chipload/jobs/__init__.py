@@ -317,7 +317,8 @@ def check_job(loaded: LoadedJob) -> tuple[list[str], bool]:
         for text in named_errors(loaded.job.table.model_dump(), loaded.job.path.parent):
             errors.add(text)
         first = [str(text) for text in err.args]
-        known = any("cannot be read" in text or text in errors.texts for text in first)
+        keys = {text.partition(" = ")[0] for text in errors.texts}
+        known = any("cannot be read" in text or text.partition(" = ")[0] in keys for text in first)
         errors.texts = errors.texts if known else [*first, *errors.texts]
         if len(errors.texts) > 1:
             errors.refuse(f"{loaded.source.partition(' sha256 ')[0]}: ")
