@@ -24,7 +24,6 @@ from chipload.geometry.contour import Region
 from chipload.lazy import LateModule
 from chipload.number_text import number_text
 from chipload.planning.pocket import trochoid
-from chipload.planning.pocket.channels import channels_of
 from chipload.planning.pocket.clearing_path import (
     CUT,
     ENTRY,
@@ -37,13 +36,12 @@ from chipload.planning.pocket.clearing_path import (
     mirrored_region,
     points_of_arcs,
     polyline,
-    segment_lengths,
     separate_polylines,
 )
 from chipload.planning.pocket.free_space import edge_places, places_along, take_free
 from chipload.planning.pocket.leftover import PocketRemainder
 from chipload.planning.pocket.reach import CHORD, Reach, centre_region, longest_line, reach_of, widest_places
-from chipload.planning.pocket.skeleton import Skeleton, skeleton_of
+from chipload.planning.pocket.skeleton import skeleton_of
 from chipload.planning.pocket.starts import Starts
 from chipload.planning.pocket.trochoid import Trochoid
 from chipload.planning.result import Event
@@ -87,12 +85,8 @@ BETWEEN = 4e-4
 #: the written path may leave the centre region by this part of R, of at most so many mm: the middle of a chord of a
 #: convex wall
 SLACK, SLACK_UP_TO = 1e-4, 4.0
-#: radius / R of a circle behind a channel from which on passes continue
-LEAVE = 0.7
 #: area / R^2 that a pass must take for its start to be used again
 WORTH = 3e-4
-#: mean radial depth / R of a pass that takes a sliver: it is not run where circles cut the channels
-SLIVER = 2e-3
 #: passes begin so far / R inside the edge of what was cut before
 INSIDE = 0.02
 #: part of the reachable area that may be left without another round
@@ -140,22 +134,20 @@ def clear_region(
                 trochoidal=trochoidal, entry=entry, progress=progress,
             )
         )  # fmt: skip
-    run = _Run(region, centres, radius, engagement, step, free, progress, entry, allowance)
-    if not trochoidal:
-        run.divide()
+    run = _Run(centres, radius, engagement, step, free, progress, entry)
     if earlier is not None:
         run.take_earlier(earlier)
     if free or earlier is not None:
         run.begin_at_edges(free)
         if trochoidal:
-            run.cut_middle_lines(None)
-        run.clear_parts()
+            run.cut_channels(region, allowance, None)
+        run.clear()
     else:
         for x, y, room in widest_places(centres, CHORD * radius):
             run.enter(x, y, room)
             if trochoidal:
-                run.cut_middle_lines((x, y, min(BORE * radius, 0.98 * room)))
-            run.clear_parts()
+                run.cut_channels(region, allowance, (x, y, min(BORE * radius, 0.98 * room)))
+            run.clear()
     run.enter_elsewhere()
     return run.result()
 
@@ -190,20 +182,16 @@ class _Run:
     """The state of one clearing: stock, path so far, places from which to continue."""
 
     def __init__(
-        self, region: Region, centres: Region, radius: float, limit: float, step: float, free: Sequence[Region],
-        progress: Progress, entry: Entry, allowance: float,
+        self, centres: Region, radius: float, limit: float, step: float, free: Sequence[Region], progress: Progress,
+        entry: Entry,
     ) -> None:  # fmt: skip
-        self.region, self.entry, self.allowance = region, entry, allowance
+        self.entry = entry
         xmin, ymin, xmax, ymax = centres.bounds
         self.centres, self.radius, self.step = centres, radius, step
         self.most_engaged, self.limit = limit - BETWEEN, limit - MARGIN
         self.progress = progress
         self.stock = PlanarStock((xmin - radius, ymin - radius, xmax + radius, ymax + radius), radius)
         self.reach: Reach = reach_of(centres, self.stock.grid, CHORD * radius)
-        self.within: Reach = self.reach
-        self.wide: Reach | None = self.reach
-        self.channels: list[Skeleton] = []
-        self.divided = False
         take_free(self.stock, free, radius)
         self.reachable = centre_region(centres, -radius)
         self.rows: list[Floats] = []
@@ -308,54 +296,10 @@ class _Run:
             if self.area - before < 1e-3 * self.radius**2:
                 break
 
-    def divide(self) -> None:
-        """Leave the channels to circles: passes clear what lies between them first."""
-        channels = channels_of(self.region, self.centres, self.radius, self.allowance, CHORD * self.radius)
-        if channels is not None:
-            grid, chord = self.stock.grid, CHORD * self.radius
-            self.wide = None if channels.wide is None else reach_of(channels.wide, grid, chord)
-            self.channels, self.divided = list(channels.lines), True
-
-    def clear_parts(self) -> None:
-        """Passes where there is room for them, circles through the channels that these lead to, by turns; then passes
-        for what both left.
-        """
-        while self.channels:
-            if self.wide is not None:
-                self.within = self.wide
-                self.clear()
-            if not self._cut_channel():
-                break
-        self.within = self.reach
-        self.clear()
-
-    def _cut_channel(self) -> bool:
-        """Circles through the nearest channel that cleared space leads to; whether there is one."""
-        loops = self._trochoid()
-        best: tuple[int, int, float] | None = None
-        nearest = math.inf
-        for k, lines in enumerate(self.channels):
-            far = np.hypot(*(lines.points - self.at).T)
-            for i in np.argsort(far, kind="stable").tolist():
-                if far[i] >= nearest:
-                    break
-                rho = min(trochoid.WIDEST * self.radius, 0.9 * loops.room(lines.points[i]))
-                if loops.is_free(lines.points[i], rho):
-                    best, nearest = (k, i, rho), float(far[i])
-                    break
-        if best is None:
-            return False
-        k, i, rho = best
-        self._run_circles(loops, self.channels.pop(k).branches(i), rho, LEAVE * self.radius)
-        return True
-
-    def _trochoid(self) -> Trochoid:
-        return Trochoid(self.stock, self.region, self.radius, self.allowance, (self.limit, self.most_engaged))
-
-    def cut_middle_lines(self, bore: tuple[float, float, float] | None) -> None:
-        """Circles along all middle lines that a bore (x, y, radius of its axis), or free space, leads to."""
+    def cut_channels(self, region: Region, allowance: float, bore: tuple[float, float, float] | None) -> None:
+        """Trochoids along the middle lines that a bore (x, y, radius of its axis), or free space, leads to."""
         R = self.radius
-        lines = skeleton_of(self.region, R + self.allowance + trochoid.LEAST * R, trochoid.WALLS * R)
+        lines = skeleton_of(region, R + allowance + trochoid.LEAST * R, trochoid.WALLS * R)
         if not len(lines.points):
             return
         if bore is None:
@@ -365,18 +309,12 @@ class _Run:
             start, rho = int(np.argmin(np.hypot(*(lines.points - bore[:2]).T))), bore[2]
         if start < 0:
             return
-        branches = lines.branches(start)
-        if bore is not None:
-            branches[0] = np.vstack([bore[:2], branches[0]])
-        self._run_circles(self._trochoid(), branches, rho)
-
-    def _run_circles(self, loops: Trochoid, branches: Sequence[Floats], rho: float, leave: float = math.inf) -> None:
-        """Circles along branches of middle lines; that of radius ``rho`` [mm] is free where the first begins."""
-        R = self.radius
-        for k, line in enumerate(branches):
-            begins = rho if k == 0 else min(trochoid.WIDEST * R, 0.9 * loops.room(line[0]))
+        loops = Trochoid(self.stock, region, R, allowance, (self.limit, self.most_engaged))
+        for k, line in enumerate(lines.branches(start)):
+            path_line = line if k or bore is None else np.vstack([bore[:2], line])
+            begins = rho if k == 0 else min(trochoid.WIDEST * R, 0.9 * loops.room(path_line[0]))
             places = []
-            for arcs, engaged in loops.circles(line, begins, leave):
+            for arcs, engaged in loops.circles(path_line, begins):
                 first = arcs[0, 0:2]
                 clear = bool(self.rows) and self._link_to(first)
                 self.add(first[None, :], LINK if clear else LIFT)
@@ -393,7 +331,7 @@ class _Run:
         for depth in DEPTHS:
             self.starts.revive()
             while self.steps <= self.most:
-                self.starts.search(self.stock, self.within, depth)
+                self.starts.search(self.stock, self.reach, depth)
                 k = self.starts.nearest(self.at, self._link_to)
                 if k is None:
                     break
@@ -445,7 +383,6 @@ class _Run:
         for x, y, heading in self.starts.candidates(k):
             start = np.array([x, y])
             clear = bool(self.rows) and self._link_to(start)  # of what is there before the pass
-            before = self.stock.state() if self.divided else None
             segments, places, took, reason, at = self._pass(x, y, heading)
             if not len(segments):
                 continue
@@ -454,9 +391,6 @@ class _Run:
             if made in self.made:
                 continue
             self.made.add(made)
-            if before is not None and took < SLIVER * self.radius * segment_lengths(segments[:, 0:7]).sum():
-                self.stock.restore(before)
-                continue
             if not self.rows or np.hypot(*(start - self.at)) > 1e-9:
                 self.add(start[None, :], LINK if clear else LIFT)
             self.passes += 1
@@ -489,7 +423,7 @@ class _Run:
                 state, self.step, self.limit, self.most_engaged, right, TURN_LEFT, IDLE * R,
                 FIT * min(R, FIT_UP_TO), SLACK * min(R, SLACK_UP_TO), R, TOUCH, steps, made, at, numbers,
                 s.grid, s.head, s.count, s.link, s.axis, s.rim, np.empty(7),
-                *self.within.arguments(),
+                *self.reach.arguments(),
             )  # fmt: skip
             s.capsules, s.used = int(numbers[0]), int(numbers[1])
             segments.append(made[: int(numbers[3])].copy())

@@ -75,14 +75,6 @@ def inner_points(contour: Contour, chord: float) -> Floats:
     return np.array(out)
 
 
-def inner_polygons(centres: Region, chord: float) -> shapely.Geometry:
-    """The centre region as polygons within it, their edges at most ``chord`` [mm] off its arcs."""
-    rings = [shapely.make_valid(shapely.polygons(inner_points(c, chord))) for c in centres.contours]
-    outer = [g for g, c in zip(rings, centres.contours, strict=True) if c.area > 0.0]
-    holes = [g for g, c in zip(rings, centres.contours, strict=True) if c.area <= 0.0]
-    return shapely.difference(shapely.union_all(outer), shapely.union_all(holes))
-
-
 def reach_of(centres: Region, grid: Floats, chord: float) -> Reach:
     """The centre region laid on the cells of the stock's grid."""
     loops = [inner_points(c, chord) for c in centres.contours]
@@ -104,7 +96,10 @@ def widest_places(centres: Region, chord: float) -> list[tuple[float, float, flo
     """Largest circles (x, y, radius) [mm], one in each separate part of the centre region, in the order of a short path
     between them.
     """
-    whole = inner_polygons(centres, chord)
+    rings = [shapely.make_valid(shapely.polygons(inner_points(c, chord))) for c in centres.contours]
+    outer = [g for g, c in zip(rings, centres.contours, strict=True) if c.area > 0.0]
+    holes = [g for g, c in zip(rings, centres.contours, strict=True) if c.area <= 0.0]
+    whole = shapely.difference(shapely.union_all(outer), shapely.union_all(holes))
     out = []
     for part in shapely.get_parts(whole):
         if part.area <= 0.0:

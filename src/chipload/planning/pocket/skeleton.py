@@ -66,18 +66,6 @@ class Skeleton:
                 open_.pop()
         return out
 
-    def parts(self, mask: NDArray[np.bool_]) -> tuple[Skeleton, ...]:
-        """The separate parts of the edges whose places are both in ``mask`` (n,)."""
-        edges = self.edges[mask[self.edges].all(axis=1)]
-        n = len(self.points)
-        graph = scipy.sparse.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
-        _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
-        out = []
-        for k in np.unique(label[edges[:, 0]]).tolist():
-            used, pairs = np.unique(edges[label[edges[:, 0]] == k], return_inverse=True)
-            out.append(Skeleton(self.points[used], self.clearance[used], pairs.reshape(-1, 2).astype(np.int64)))
-        return tuple(out)
-
 
 def skeleton_of(region: Region, least: float, spacing: float) -> Skeleton:
     """The middle lines of a region with a clearance of at least ``least`` [mm], from wall places ``spacing`` apart.
@@ -111,28 +99,6 @@ def skeleton_of(region: Region, least: float, spacing: float) -> Skeleton:
     clearance[within] = distance(region.segments, vertices[within])
     apart = np.hypot(*(walls[between[:, 0]] - walls[between[:, 1]]).T)
     kept = (clearance[pairs] >= least).all(axis=1)
-    kept &= apart >= APART * clearance[pairs].min(axis=1)
-    points, clearance, pairs, k = _divided(vertices, clearance, pairs[kept], region, 2.0 * spacing)
-    pairs = pairs[apart[kept][k] >= APART * clearance[pairs].max(axis=1)]
-    used, edges = np.unique(pairs, return_inverse=True)
-    return Skeleton(points[used], clearance[used], edges.reshape(-1, 2).astype(np.int64))
-
-
-def _divided(
-    points: Floats, clearance: Floats, pairs: Ints, region: Region, longest: float
-) -> tuple[Floats, Floats, Ints, Ints]:
-    """Points, clearances and pairs of edges of at most ``longest`` [mm], and the edge that each was part of.
-
-    An edge between two corners of the walls is as long as they are the nearest.
-    """
-    p, q = points[pairs[:, 0]], points[pairs[:, 1]]
-    parts = np.maximum(1, np.ceil(np.hypot(*(q - p).T) / longest).astype(np.int64))
-    k, whole = (np.repeat(np.arange(len(parts)), n) for n in (parts - 1, parts))
-    before = np.cumsum(parts - 1) - (parts - 1)  # places that are new in the edges before
-    new = p[k] + ((np.arange(len(k)) - before[k] + 1) / parts[k])[:, None] * (q - p)[k]
-    part = np.arange(len(whole)) - (np.cumsum(parts) - parts)[whole]
-    number = len(points) + before[whole] + part
-    first = np.where(part == 0, pairs[whole, 0], number - 1)
-    last = np.where(part == parts[whole] - 1, pairs[whole, 1], number)
-    more = distance(region.segments, new) if len(new) else np.zeros(0)
-    return np.vstack([points, new]), np.append(clearance, more), np.column_stack([first, last]), whole
+    kept &= apart >= APART * clearance[pairs].max(axis=1)
+    used, edges = np.unique(pairs[kept], return_inverse=True)
+    return Skeleton(vertices[used], clearance[used], edges.reshape(-1, 2).astype(np.int64))

@@ -37,8 +37,6 @@ SPACING = 0.05
 WALLS = 0.03
 #: places of a circle that are checked first, and halvings of the advance
 PLACES, HALVINGS = 48, 9
-#: share of the engagement that an advance aims at, and from which on it is taken
-AIM, CLOSE = 0.985, 0.95
 #: greatest sweep of one arc [rad]
 SWEEP = 2.0
 
@@ -55,24 +53,36 @@ class Trochoid:
         self.seg = np.empty(7)
         self.met = np.zeros(PLACES, dtype=np.bool_)
 
-    def circles(self, line: Floats, rho: float, leave: float = math.inf) -> Iterator[tuple[Floats, Floats]]:
+    def circles(self, line: Floats, rho: float) -> Iterator[tuple[Floats, Floats]]:
         """The arcs (m, 7) of each circle along a polyline (k, 2), with the greatest engagement (m,) of each [rad].
 
         ``rho`` is the radius that is free about the beginning of the line. Each circle is taken from the stock when
-        the next one is requested. It ends early where even the least advance would exceed the engagement, and behind a
-        channel, where circles become wider than ``leave`` [mm] again.
+        the next one is requested. It ends early where even the least advance would exceed the engagement.
         """
-        R, narrow = self.radius, False
+        R = self.radius
         at, s, room = self._places(line)
         along, advance = 0.0, FARTHEST * R
         while along < s[-1] - 1e-9 * R:
-            found = self._advance(at, s, room, along, rho, advance)
+            low, high = 0.0, min(FARTHEST * R, 2.0 * advance, s[-1] - along)
+            found = None
+            trial = high
+            for _ in range(HALVINGS):
+                if high < SLOWEST * R and low == 0.0:
+                    break
+                centre, wide = self._circle(at, s, room, along + trial, rho + trial)
+                if wide >= LEAST * R and self._most(centre, wide, self.limit) <= self.limit:
+                    low, found = trial, (centre, wide)
+                    if trial == high:
+                        break
+                else:
+                    high = trial
+                trial = 0.5 * (low + high)
+                if low > 0.0 and high - low < 0.1 * low:
+                    break
             if found is None:
                 return
-            low, centre, wide = found
-            if narrow and wide > leave:
-                return
-            narrow = narrow or wide < 0.7 * leave
+            centre, wide = found
+            self._most(centre, wide, math.inf)
             arcs = self._cutting_arcs(centre, wide, line[-1] - line[0])
             along, advance, rho = along + low, low, wide
             if not len(arcs):
@@ -86,47 +96,9 @@ class Trochoid:
             yield arcs, engaged
             self.stock.remove_segments(arcs)
 
-    def _advance(
-        self, at: Floats, s: Floats, room: Floats, along: float, rho: float, guess: float
-    ) -> tuple[float, Floats, float] | None:
-        """The advance of the next circle [mm], its centre and its radius; None where even the least one is too much.
-
-        1 - cos E of a circle is proportional to its advance: from one that was tried the next one follows.
-        """
-        R = self.radius
-        most = min(FARTHEST * R, 2.0 * guess, s[-1] - along)
-        low, high = 0.0, most
-        best: tuple[float, Floats, float] | None = None
-        trial = min(guess, high)
-        for _ in range(HALVINGS):
-            centre, wide = self._circle(at, s, room, along + trial, rho + trial)
-            engaged = self._most(centre, wide, math.inf) if wide >= LEAST * R else math.pi
-            if engaged <= self.limit:
-                low, best = trial, (trial, centre, wide)
-                if trial == high or engaged > CLOSE * self.limit:
-                    return best
-            else:
-                high = trial
-                if high < SLOWEST * R and best is None:
-                    return None
-            law = trial * (1.0 - math.cos(AIM * self.limit)) / (1.0 - math.cos(engaged)) if engaged > 0.0 else high
-            if engaged <= self.limit and law >= high == most:
-                trial = high
-            else:
-                trial = law if low < law < high and wide >= LEAST * R else 0.5 * (low + high)
-            if best is not None and high - low < 0.1 * low:
-                break
-        if best is not None:
-            self._most(best[1], best[2], math.inf)  # the places that it meets
-        return best
-
     def room(self, place: Floats) -> float:
         """Distance [mm] that the centre can move from a place in any direction."""
         return max(0.0, float(distance(self.walls, place)[0]) - self.off)
-
-    def is_free(self, place: Floats, rho: float) -> bool:
-        """Whether a circle of radius ``rho`` [mm] about a place meets no stock."""
-        return rho > 0.0 and self._most(place, rho, 0.0) <= 0.0
 
     def _places(self, line: Floats) -> tuple[Floats, Floats, Floats]:
         """Places of a line at most ``SPACING`` R apart, their lengths along it and the room about them."""
