@@ -153,7 +153,7 @@ def test_walls_of_a_frame_give_way_and_vibrate_as_in_calculix(tmp_path, state):
     ours, work = by_cells(state, PLACES, 2)
     np.testing.assert_allclose(ours, theirs, rtol=(0.09, 0.09, 0.05, 0.05)[state])
     # of the finished frame the greatest is 2.3e-4 mm/N
-    assert np.abs(ours - theirs).max() < 0.02 * 2.3e-4
+    assert np.abs(ours - theirs).max() < 0.025 * 2.3e-4
     np.testing.assert_allclose(vibration_modes(work, 5).frequency, their_frequency, rtol=(0.035, 0.03)[state > 0])
     if state == 0:
         some = [0, 3, 6]
