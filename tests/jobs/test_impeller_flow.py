@@ -47,10 +47,10 @@ def test_the_flow_that_is_not_stated_is_found(tmp_path: Path, over: bool) -> Non
     assert "narrow end" in text
 
 
-def drop(thick_at_top: bool) -> str:
+def drop(thick_at_top: bool, thicker: float = 0.8) -> str:
     """Two sections of an axial blade: a drop, round at one end of its chord, along z at radii of 20 and 30 mm."""
     t = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
-    z, y = 10.0 * np.cos(t), np.sin(t) * (1.0 + 0.8 * np.cos(t))
+    z, y = 10.0 * np.cos(t), np.sin(t) * (1.0 + thicker * np.cos(t))
     z = z if thick_at_top else -z
     lines = []
     for r in (20.0, 30.0):
@@ -68,6 +68,15 @@ def test_of_a_straight_hub_the_thick_edge_tells_the_flow(tmp_path: Path, over: b
     found, text = flow_of_sections(tmp_path, given)
     assert found is over
     assert "thicker edge" in text
+
+
+def test_a_straight_hub_and_blades_alike_at_both_edges_do_not_tell_it(tmp_path: Path) -> None:
+    given = impeller_table(None).sections
+    assert given is not None
+    (tmp_path / "h.csv").write_text("-10 20\n10 20\n")
+    (tmp_path / "b.curve").write_text(drop(True, 0.0))
+    with pytest.raises(InputError, match=r"flow_along_x: missing: .*: state true or false"):
+        flow_of_sections(tmp_path, given)
 
 
 def test_a_straight_hub_in_a_step_file_does_not_tell_it(tmp_path: Path) -> None:

@@ -54,7 +54,13 @@ def require_narrow_end_up(hub: Revolved, part: ImpellerTable) -> None:
 
 
 def flow_of_sections(folder: Path, table: SectionsTable) -> tuple[bool, str]:
-    """Whether the flow comes along the axis of the files, and what tells it."""
+    """Whether the flow comes along the axis of the files, and what tells it.
+
+    Raises
+    ------
+    InputError
+        Both ends of the hub are as wide as one another, and both edges of the blade as thick.
+    """
     low, high = _end_radii(read_meridian(folder / table.hub, table.unit, axis=table.axis))
     if max(low, high) > (1.0 + SAME_RADIUS) * min(low, high):
         return high > low, "by the hub, whose narrow end is up"
@@ -64,7 +70,11 @@ def flow_of_sections(folder: Path, table: SectionsTable) -> tuple[bool, str]:
     upper, lower = np.linalg.norm(blade.plus.at(u, v) - blade.minus.at(u, v), axis=1).reshape(2, -1).mean(axis=1)
     if max(upper, lower) > (1.0 + SAME_RADIUS) * min(upper, lower):
         return bool(lower > upper), "by the blade, whose thicker edge is the leading one"
-    return True, "as nothing tells it: both ends of hub and blade are alike"
+    raise InputError(
+        f"impeller.sections.flow_along_x: missing: the hub is {low:.4g} and {high:.4g} mm in radius at its ends, the "
+        f"blade {lower:.3g} and {upper:.3g} mm thick near its edges, which do not tell where the flow comes from: "
+        "state true or false"
+    )
 
 
 def flow_of_faces(faces: Sequence[Face], key: str) -> tuple[str, str]:
