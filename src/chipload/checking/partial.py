@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -44,7 +43,7 @@ class PartialLimits:
                 continue
             row = int(np.nanargmax(values))
             if name not in self.worst or values[row] > self.worst[name][0]:
-                self.worst[name] = float(values[row]), int(_value_at(columns, "line", row))
+                self.worst[name] = float(values[row]), int(columns["line"][row]) if "line" in columns else 0
 
     def text(self, most: int = 3) -> str:
         """The limits nearest to their value, at most ``most``; empty: no step is known."""
@@ -61,8 +60,3 @@ class PartialLimits:
     def with_text(self, progress: Progress) -> Progress:
         """A progress that also states the worst values so far."""
         return lambda done, what: progress(done, " \u00b7 ".join(filter(None, (what, self.text()))))
-
-
-# -- parts ------------------------------------------------------------------------------------------------------
-def _value_at(columns: Columns, name: str, row: int) -> Any:
-    return np.asarray(columns[name])[row] if name in columns else 0
