@@ -192,7 +192,7 @@ def test_another_version_of_the_schema_is_refused(folder, tmp_path):
     for change in ({"schema_version": 2}, {"verdict": "fine"}, {"more": 1}):
         (tmp_path / "summary.json").write_text(json.dumps(values | change))
         with pytest.raises(
-            InputError, match=r"is not a result of schema version 1 \(1 differences\): run the job again"
+            InputError, match=r"is not a result of schema version 1 \(1 difference\): run the job again"
         ):
             read_summary(tmp_path)
 
