@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -81,6 +82,17 @@ def test_a_log_has_what_the_server_wrote(server, tmp_path) -> None:
     assert (np.diff(steps) >= 1.0 - 1e-9).all()
     # the source's own clock: 0.05 s a step and some
     assert (np.diff(log.time) > 0.04 * np.diff(steps)).all()
+
+
+def test_a_notebook_records_too(server) -> None:
+    """Where an event loop runs already, as in Jupyter."""
+
+    async def cell() -> str:
+        return record_spindle(OpcUaSource(server, {"power_w": "ns=2;s=power"}, interval_s=0.01), 0.5)[0]
+
+    with ThreadPoolExecutor(1) as pool:
+        log = pool.submit(asyncio.run, cell()).result()
+    assert len(log.splitlines()) >= 4
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")

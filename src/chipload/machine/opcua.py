@@ -7,6 +7,7 @@ import math
 import os
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlsplit
@@ -88,14 +89,31 @@ def record_spindle(source: OpcUaSource, duration_s: float, progress: Progress = 
     if not 0.0 < duration_s < math.inf:
         raise InputError(f"--duration-s = {duration_s:g}: must be above 0")
     samples: list[Sample] = []
-    try:
+
+    def record() -> None:
         asyncio.run(_record(source, duration_s, samples, progress))
+
+    try:
+        if _loop_runs():
+            # a notebook: an event loop starts no other one in its own thread
+            with ThreadPoolExecutor(1) as pool:
+                pool.submit(record).result()
+        else:
+            record()
     except KeyboardInterrupt:
         if not samples:
             raise
     log, omitted = log_text(samples, COLUMNS, f"OPC UA {source.address}")
     text = f"{omitted} samples are left out: a column is not yet known or its status is bad, or time does not rise"
     return log, [Finding("opcua-unavailable", 0, text)] if omitted else []
+
+
+def _loop_runs() -> bool:
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
 
 
 async def _record(source: OpcUaSource, duration_s: float, samples: list[Sample], progress: Progress) -> None:

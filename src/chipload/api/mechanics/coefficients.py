@@ -107,7 +107,8 @@ def fit(
 
     Examples
     --------
-    Two slots whose forces are those of a known material: the fit finds its coefficients again.
+    Two slots whose forces are those of a known material: the fit finds its coefficients again, within 0.1 % as it takes
+    the chip in narrower pieces than the forces do.
 
     >>> import chipload
     >>> mill = chipload.Cutter(diameter_mm=10, flutes=3, helix_deg=30, flute_length_mm=22, overhang_mm=35,
@@ -121,7 +122,7 @@ def fit(
     ...                              speed_rpm=3000, engagement=slot))
     >>> found = fit(cuts, mill).coefficients.values
     >>> found.round().tolist(), bool((abs(found / [1000.0, 300.0, 200.0, 10.0, 5.0, 2.0] - 1.0) < 0.01).all())
-    ([1000.0, 300.0, 200.0, 10.0, 5.0, 2.0], True)
+    ([1001.0, 300.0, 200.0, 10.0, 5.0, 2.0], True)
     """
     mill = straight_cutter(cutter)
     if method not in ("average", "instantaneous"):
