@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import synthetic_cell
 from chipload.control.learning import learn_material
 from chipload.errors import InputError
-from synthetic_cell import PRIOR, cell, closed_form_program
+from synthetic_cell import PRIOR, cell, closed_form_program, draw_truth
 
 #: bounds of a coverage of 95 %
 BOUNDS = (0.93, 0.97)
@@ -49,7 +49,8 @@ def main() -> int:
             found = learn_material(logs, signal, PRIOR)
         except InputError as err:
             refused += 1
-            print(f"cell {1000 + seed}: {err}")
+            wear = draw_truth(np.random.default_rng(1000 + seed)).wear
+            print(f"cell {1000 + seed}, whose Kte changes by {100.0 * 600.0 * wear:.0f} % in 600 s: {err}")
             continue
         sd = np.sqrt(np.diagonal(found.material.variances))
         rate, spread = found.wear[1]

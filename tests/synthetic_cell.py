@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,9 +58,12 @@ def draw_truth(rng: np.random.Generator) -> Truth:
 def power_log(
     rng: np.random.Generator, truth: Truth, program: PredictedTorque, before: float, idle: tuple[float, float]
 ) -> SpindleLog:
-    """Return a log of the power [N mm/s] every 0.1 s, with its own clock, an idle power of the day and noise."""
+    """Return a log of the power [N mm/s] every 0.1 s, with its own clock, an idle power of the day, a sensor that
+    filters it by up to 0.3 s, and noise.
+    """
     error = TORQUE_ERROR * rng.standard_normal()
     lag, rate = rng.uniform(2.0, 20.0), rng.uniform(0.95, 1.2)
+    kept = math.exp(-0.1 / rng.uniform(0.01, 0.3))
     t = np.arange(0.0, program.time[-1] * rate + lag + 5.0, 0.1)
     place = (t - lag) / rate
     row = np.minimum(np.searchsorted(program.time, place), len(program.time) - 1)
@@ -68,7 +72,10 @@ def power_log(
     torque = truth.cutting * program.cutting + truth.edge * (1.0 + truth.wear * cut) * program.edge
     gain = truth.gain * (1.0 + error) / EFFICIENCY
     power = idle[0] * (1.0 + 0.02 * rng.standard_normal()) + idle[1] * program.speed[0]
-    power = power + np.where(running, gain * program.speed[row] * torque[row], 0.0)
+    cut = np.where(running, gain * program.speed[row] * torque[row], 0.0)
+    for k in range(1, len(cut)):
+        cut[k] += kept * (cut[k - 1] - cut[k])
+    power = power + cut
     return SpindleLog(t, power=power + rng.standard_normal(len(t)) * rng.uniform(0.01, 0.05) * power.max())
 
 

@@ -148,6 +148,12 @@ def test_a_folder_is_the_cell_that_its_files_state(tmp_path: Path) -> None:
         '[[mode]]\ndirection = "x"\nfrequency_hz = 1200.0\ndamping_ratio = 0.03\nstiffness_n_um = 20.0\n'
     )
     (folder / "wrong.toml").write_text('name = "wrong"\nktc_mpa = 700.0\n')
+    (folder / "walls.toml").write_text(
+        'material = "shop.toml"\ncompliance_error = 0.1\n[cutter]\ndiameter_mm = 10.0\nflutes = 4\nhelix_deg = 30.0\n'
+        "flute_length_mm = 22.0\noverhang_mm = 40.0\nmodulus_gpa = 580.0\n[[wall]]\nmilling = 'down'\n"
+        "axial_depth_mm = 12.0\nradial_depth_mm = 2.0\nfeed_per_tooth_mm = 0.1\nnoise_um = 1.0\nplace_um = 5.0\n"
+        "height_mm = [1.0, 6.0, 11.0]\nerror_um = [38.0, 22.0, 21.0]\n"
+    )
     code, out, err = call("check", folder)
     assert (code, err) == (3, "")
     lines = out.splitlines()
@@ -156,6 +162,7 @@ def test_a_folder_is_the_cell_that_its_files_state(tmp_path: Path) -> None:
         "learned: Ktc 767 MPa +- 6 % (two standard deviations), 767 +- 50 % in al7075-t6; ",
         "spindle.toml: spindle identified by its power, efficiency 0.81 +- 4 %",
         "modes.toml: 1 mode of a hammer test, 1200 Hz",
+        "walls.toml: 1 measured wall of shop with 3 values, for chipload learn-wall",
         "wrong.toml: refused: ",
         "job.toml: names al7075-t6, which was learned further: shop.toml (shop) knows it better",
     ):

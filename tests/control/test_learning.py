@@ -109,6 +109,28 @@ def test_lines_align_what_a_lag_cannot(program):
     assert found.Ktc == pytest.approx(1.2 * PRIOR.Ktc, rel=0.06)
 
 
+def test_lag_of_the_sensor_is_found():
+    """A drive filters its power by 0.15 s and the lines are logged 0.1 s early: the filter in closed form, with
+    cuts of 1 to 5 s. Without the lag each cut begins and ends wrong, and the idle power takes what follows it.
+    """
+    tau, early, step = 0.15, 0.1, 0.02
+    short = closed_form_program(np.random.default_rng(3), lines=30)
+    t = np.arange(0.0, short.time[-1], step)
+    row = np.searchsorted(short.time, t)
+    power = 2e5 + (1.2 * short.cutting + 0.85 * short.edge)[row] * short.speed[row] / EFFICIENCY
+    shown = np.empty(len(power))
+    shown[0] = 2e5
+    for k in range(1, len(power)):
+        shown[k] = power[k] + (shown[k - 1] - power[k]) * np.exp(-step / tau)
+    line = short.line[np.searchsorted(short.time, np.minimum(t + early, short.time[-1]))]
+    log = SpindleLog(t, power=shown, line=line.astype(float))
+    aligned = align_log("log", log, log.power, short)
+    assert aligned.sensor_lag == pytest.approx(tau, rel=0.1)
+    found = learn_material([blocks_of(aligned, short)], Signal(SignalKind.POWER, 1.0 / EFFICIENCY, 0.0), PRIOR)
+    assert found.material.Ktc == pytest.approx(1.2 * PRIOR.Ktc, rel=0.01)
+    assert found.material.Kte == pytest.approx(0.85 * PRIOR.Kte, rel=0.03)
+
+
 def test_a_clock_that_jumps_is_named(log, program):
     """40 s are added in the middle of a program: without its lines it is refused, and the jump is said."""
     time = np.where(np.arange(len(log.time)) > len(log.time) // 2, log.time + 40.0, log.time)

@@ -154,9 +154,10 @@ def test_the_command(tmp_path, predicted) -> None:
     (tmp_path / "again.toml").write_text(path.read_text().replace('"al7075-t6"', '"after.toml"'))
     assert call("learn-wall", tmp_path / "again.toml", "--out", out)[0] == 0
     for change, message in (
-        (1000.0, "times what is predicted"), (math.nan, "error_um"),
+        (1000.0, "times what is predicted"), (0.001, "check its unit (a factor of 0.001)"), (math.nan, "error_um"),
     ):  # fmt: skip
-        path.write_text(walls_text([change * e for e in predicted[1]], 0.02, 0.5))
+        # the place of a wall may be all of a value in mm
+        path.write_text(walls_text([change * e for e in predicted[1]], 0.02, 5.0 if change == 0.001 else 0.5))
         code, _, err = call("learn-wall", path, "--out", out)
         assert code == 2
         assert message in err

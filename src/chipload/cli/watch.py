@@ -190,7 +190,7 @@ def _pins(
 def _summary(one: LoadWatch, found: int) -> int:
     """Write what was watched, and return the exit code."""
     whole, cut, judged = (number_text(x, 3) for x in (one.seconds, one.cut_seconds, one.judged_seconds))
-    show(f"{whole} s watched, {cut} s of them in the cut, {judged} s judged; {found} alarms")
+    show(f"{whole} s watched, {cut} s of them in the cut, {judged} s judged; {found} alarm{'' if found == 1 else 's'}")
     if one.judged_seconds == 0.0:
         show(
             "nothing could be judged: the log needs the idle spindle before the first cut, lines of the program, and "

@@ -297,9 +297,11 @@ def learn_material(
         kept = fresh
     off = x[model.error]
     if len(logs) > 1 and np.abs(off).max() > OUTLIER * TORQUE_ERROR:
-        worst = int(np.argmax(np.abs(off)))
+        # of three logs the two that agree are right
+        against = (1.0 + off) / (1.0 + np.median(off)) - 1.0
+        worst = int(np.argmax(np.abs(against)))
         raise InputError(
-            f"{logs[worst].name}: its cut takes {share_text(off[worst])} than that of the other logs, at most "
+            f"{logs[worst].name}: its cut takes {share_text(against[worst])} than that of the other logs, at most "
             f"{100.0 * OUTLIER * TORQUE_ERROR:.0f} % is believed: one of them has another tool or material, or a worn "
             "edge; leave it out"
         )
@@ -409,7 +411,7 @@ def learn_from_logs(
     logs : by name, in the order in which they ran with the same tools
     predicted : of the program, with the prior material
     signal, prior, name : as :func:`learn_material`
-    sensor_lag : time constant of the sensor [s]
+    sensor_lag : time constant of the sensor [s]; 0: it is found
     hashes : log -> SHA-256 of its bytes, for the record of the material
     worn : Kte is that of the edge after the last log, with which the next program is cut; else of a sharp edge
 
@@ -430,7 +432,7 @@ def learn_from_logs(
             raise InputError(f"{key}: no column of {signal.kind}, which the other logs have: learn from them apart")
         aligned.append(align_log(key, log, values, predicted, sensor_lag))
         before = {tool: len(blocks) * seconds for tool, seconds in cut.items()}
-        blocks.append(blocks_of(aligned[-1], predicted, before, sensor_lag))
+        blocks.append(blocks_of(aligned[-1], predicted, before))
     evidence = ", ".join(f"{key} (sha256 {hashes[key][:16]})" if key in hashes else key for key in logs)
     found = learn_material(blocks, signal, prior, name, evidence, len(blocks) * max(cut.values()) if worn else None)
     material = replace(found.material, learned=_record(found, aligned, hashes))

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.control.log_alignment import AlignedLog, PredictedTorque
+from chipload.control.spindle import first_order
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: blocks of a log at most, samples of one at least, and how often the time constant of the sensor it is long at least
 MOST_BLOCKS, LEAST_SAMPLES, BLOCK_LAGS = 240, 3, 4.0
-#: time constant of a sensor that is not stated [s]: drives filter their power and current by 0.02 to 0.1 s
-SENSOR_LAG_S = 0.1
+#: least time constant of a sensor that blocks are long against [s], and what of it is not known
+SENSOR_LAG_S, LAG_ERROR = 0.1, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +29,10 @@ class LogBlocks:
     ----------
     name : of the log
     time : [s] of its middle, in the log
-    signal, speed, cutting, edge : means over the block; the torques in N mm, 0 in the air
+    signal, speed, cutting, edge : means over the block; the torques in N mm behind the sensor
     edge_time : mean of edge torque times the time for which the tool has cut [N mm s]
-    misfit : what the torque of the block would change if the alignment were off by a sample, or by the lag of the
-        sensor [N mm]
+    misfit : what the torque of the block would change if the alignment were off by a sample, or by what is not known of
+        the lag of the sensor [N mm]
     line, tool : of its middle
     """
 
@@ -51,14 +52,12 @@ def blocks_of(
     aligned: AlignedLog,
     predicted: PredictedTorque,
     before: Mapping[int, float] = MappingProxyType({}),
-    sensor_lag: float = 0.0,
 ) -> LogBlocks:
-    """Return the means of a log over blocks of equal time, long against the sensor.
+    """Return the means of a log over blocks of equal time, long against the sensor, and of what the sensor should show.
 
     Parameters
     ----------
     before : tool -> time for which it has cut before this log [s]; none: it was sharp
-    sensor_lag : time constant of the sensor [s]; 0: not known, SENSOR_LAG_S
     """
     time, inside = aligned.time, aligned.row >= 0
     row = np.maximum(aligned.row, 0)
@@ -69,18 +68,21 @@ def blocks_of(
         own = predicted.tool == number
         cut[own] = before.get(int(number), 0.0) + np.cumsum(np.where(load > 0.0, predicted.time - start, 0.0)[own])
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
-    lag = sensor_lag if sensor_lag > 0.0 else SENSOR_LAG_S
+    lag = max(aligned.sensor_lag, SENSOR_LAG_S)
     length = max((time[-1] - time[0]) / MOST_BLOCKS, LEAST_SAMPLES * step, BLOCK_LAGS * lag)
     place = ((time - time[0]) / length).astype(np.int64)
     n = int(place[-1]) + 1
     # before and after the program the speed of the spindle is not known
     speed = np.where(inside, predicted.speed[row], 0.0)
     kept = speed > 0.0
-    torque = np.where(inside, load[row], 0.0)
+    cutting, edge, edge_time = (
+        first_order(np.where(inside, values[row], 0.0), time, aligned.sensor_lag)
+        for values in (predicted.cutting, predicted.edge, predicted.edge * cut)
+    )
+    torque = cutting + edge
     columns = {
-        "signal": aligned.signal, "speed": speed, "cutting": np.where(inside, predicted.cutting[row], 0.0),
-        "edge": np.where(inside, predicted.edge[row], 0.0), "time": time,
-        "edge_time": np.where(inside, predicted.edge[row] * cut[row], 0.0),
+        "signal": aligned.signal, "speed": speed, "cutting": cutting, "edge": edge, "time": time,
+        "edge_time": edge_time,
     }  # fmt: skip
     count = np.bincount(place[kept], minlength=n)
     means = {
@@ -90,7 +92,7 @@ def blocks_of(
     jumps = np.zeros(n)
     change = np.abs(np.diff(torque, prepend=torque[:1]))
     np.add.at(jumps, place[kept], change[kept])
-    late = max(lag, step) / length
+    late = max(LAG_ERROR * lag, step) / length
     middle = np.array([int(np.median(np.flatnonzero(place == k))) if c else 0 for k, c in enumerate(count)])
     full = (count >= max(LEAST_SAMPLES, int(0.5 * length / step))) & (count > 0)
     whole = {key: values[full] for key, values in means.items()}

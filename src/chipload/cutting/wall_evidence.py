@@ -233,16 +233,21 @@ def _prediction(walls: Sequence[MeasuredWall], prior: Material, at: Floats) -> t
 
 
 def _check_unit(walls: Sequence[MeasuredWall], prior: Material) -> None:
-    """Refuse errors that are 10 or 1000 times what is predicted: the unit."""
+    """Refuse errors that are 10 or 1000 times what is predicted, or that hardly vary over the height: the unit."""
     for wall in walls:
-        prediction = float(np.abs(wall.predict(prior)).max())
-        size, places = float(np.abs(wall.error_um).max()), 3.0 * (wall.place_um + wall.noise_um)
+        predicted, measured = wall.predict(prior), wall.error_um
+        places = 3.0 * (wall.place_um + wall.noise_um)
+        size, prediction, what = float(np.abs(measured).max()), float(np.abs(predicted).max()), "is up to"
+        # the place moves a whole wall, it does not flatten it
+        flat = len(measured) > 2 and np.ptp(measured) < 0.01 * np.ptp(predicted)
+        if flat:
+            size, prediction, what = float(np.ptp(measured)), float(np.ptp(predicted)), "varies over the height by"
         ratio = size / max(prediction, 1e-12)
-        if size > 10.0 * prediction + places or (size + places < 0.1 * prediction):
+        unit = f" (a factor of {number_text(10.0 ** round(math.log10(ratio)))})" if ratio > 0.0 else ""
+        if size > 10.0 * prediction + places or (size + places < 0.1 * prediction) or flat:
             raise InputError(
-                f"{wall.name}: error_um is up to {number_text(size, 3)}, {number_text(ratio, 2)} times what is "
-                f"predicted, {number_text(prediction, 3)}: check its unit (a factor of "
-                f"{number_text(10.0 ** round(math.log10(ratio)) if ratio > 0.0 else 0.0)}), the cutter and the cut"
+                f"{wall.name}: error_um {what} {number_text(size, 3)}, {number_text(ratio, 2)} times what is "
+                f"predicted, {number_text(prediction, 3)}: check its unit{unit}, the cutter and the cut"
             )
 
 

@@ -45,6 +45,8 @@ def inspect_file(path: Path, overrides: Sequence[str] = ()) -> Inspected | None:
 def _toml_kind(path: Path) -> Callable[[Path], list[str]] | None:
     """How a TOML file is read that is no job; None: it is one."""
     values = parse_toml(path.name, read_regular(path, str(path), LARGEST_FILE, "not a file of chipload"))
+    if set(MEASURED_WALLS) <= set(values):
+        return _walls
     if any(c.key in values for c in CAPABILITIES):
         return None
     return next((reader for keys, reader in BY_KEYS if keys <= set(values)), None)
@@ -171,6 +173,15 @@ def _fuzzy(path: Path) -> list[str]:
     return [f"{path.name}: rules of a fuzzy controller: {read_fuzzy(path).name}"]
 
 
+def _walls(path: Path) -> list[str]:
+    from chipload.jobs.wall_measurement import read_wall_file
+
+    walls, prior, _, _ = read_wall_file(path)
+    values = sum(len(wall.error_um) for wall in walls)
+    number = f"{len(walls)} measured wall{'s' if len(walls) > 1 else ''}"
+    return [f"{path.name}: {number} of {prior.name} with {values} values, for chipload learn-wall"]
+
+
 def _model(path: Path) -> list[str]:
     from chipload.geometry.step_faces import read_faces
     from chipload.geometry.step_roles import roles_of
@@ -218,6 +229,8 @@ def _box(bounds: Any) -> str:
     )
 
 
+#: keys of a file of measured walls; a job has ``wall`` too
+MEASURED_WALLS = ("wall", "compliance_error")
 #: keys that only one kind of TOML file has, and how it is read
 BY_KEYS: tuple[tuple[set[str], Callable[[Path], list[str]]], ...] = (
     ({"override", "path"}, _hal),

@@ -64,8 +64,20 @@ def learn_from_wall_file(path: Path, name: str = "") -> WallKnowledge:
     Raises
     ------
     InputError
-        The file cannot be read, a key is unknown, missing or out of range, or as
-        :func:`chipload.cutting.wall_evidence.learn_from_walls`.
+        As :func:`read_wall_file` and :func:`chipload.cutting.wall_evidence.learn_from_walls`.
+    """
+    walls, prior, error, digest = read_wall_file(path)
+    return learn_from_walls(walls, prior, error, name, (path.name, digest))
+
+
+def read_wall_file(path: Path) -> tuple[list[MeasuredWall], Material, float, str]:
+    """Return the walls of a file, the material before they were measured, the relative standard deviation of the
+    compliance, and the SHA-256 of the file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or a key is unknown, missing or out of range.
     """
     data = read_regular(path, path.name, LARGEST_FILE)
     try:
@@ -79,7 +91,7 @@ def learn_from_wall_file(path: Path, name: str = "") -> WallKnowledge:
     walls = [_wall_of(f"wall.{k}" if own.name is None else own.name, own, cutter) for k, own in enumerate(table.wall)]
     if len({wall.name for wall in walls}) < len(walls):
         raise InputError(f"{path.name}: wall: two have one name")
-    return learn_from_walls(walls, prior, table.compliance_error, name, (path.name, sha256(data).hexdigest()))
+    return walls, prior, table.compliance_error, sha256(data).hexdigest()
 
 
 def _wall_of(label: str, table: MeasuredWallTable, cutter: Cutter) -> MeasuredWall:
