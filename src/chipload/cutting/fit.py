@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.turns import MeasuredCut, Turns, turns_of
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
-from chipload.engagement.tooth_surfaces import chips_of_teeth
+from chipload.engagement.tooth_surfaces import STEADY, chips_of_teeth
 from chipload.errors import InputError
 from chipload.lazy import LateModule, scipy
 
@@ -47,9 +47,6 @@ LOOSE = 1e-6
 #: singular value over the greatest below which the error of the chip, 0.3 %, would determine a coefficient, not the
 #: measurement: four teeth in a slot with a free zero have 0.002, three teeth 0.014
 WEAK = 4e-3
-#: piece of immersion in which a chip is a sinusoid [rad]: wide ones change Ktc by 0.09 %, half a standard deviation of
-#: a fit without any fault but noise
-PIECE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +161,7 @@ class Prediction:
 # -- the model --------------------------------------------------------------------------------------------------
 def _chips(cut: MeasuredCut, cutter: Cutter) -> ToothEngagement:
     front = engagement_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
-    return chips_of_teeth(front, cutter, PIECE)
+    return chips_of_teeth(front, cutter, STEADY)
 
 
 def unit_forces(cut: MeasuredCut, cutter: Cutter, theta: Floats) -> Floats:

@@ -148,7 +148,7 @@ def test_a_left_hand_cutter_has_the_mirrored_force():
 def test_a_chip_beyond_the_measured_range_is_noted():
     metal = chipload.Material("steel", 1800.0, 600.0, 200.0, 30.0, 40.0, 2.0, source="made up", chip=(0.01, 0.1))
     turn = chipload.tooth_forces(mill(), metal, engagement(), 0.15, 3000.0)
-    assert [note[:36] for note in turn.notes] == ["material steel: a chip of 0.15007 mm"]
+    assert [note[:36] for note in turn.notes] == ["material steel: a chip of 0.150027 m"]
     assert chipload.tooth_forces(mill(), metal, engagement(), 0.05, 3000.0).notes == ()
 
 

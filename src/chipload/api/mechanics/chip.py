@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chipload.api.mechanics.cut import CutEngagement, Floats, engaged_ranges, read_only, straight_cutter
+from chipload.api.mechanics.cut import CutEngagement, Floats, chips_of_cut, read_only, straight_cutter
 from chipload.api.values import AnyCutter
-from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 
 #: places of the immersion where none are stated
@@ -86,7 +85,7 @@ def undeformed_chip(
     [0.05, 0.1]
     """
     mill = straight_cutter(cutter)
-    chips = chips_of_teeth(engaged_ranges(mill, engagement, feed_per_tooth_mm), mill)
+    chips = chips_of_cut(mill, engagement, feed_per_tooth_mm)
     if not 0.0 <= height_mm <= engagement.axial_depth_mm:
         raise InputError(
             f"height_mm = {height_mm:g}: must be from 0 to engagement.axial_depth_mm = {engagement.axial_depth_mm:g}"

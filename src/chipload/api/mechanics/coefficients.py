@@ -107,8 +107,7 @@ def fit(
 
     Examples
     --------
-    Two slots whose forces are those of a known material: the fit finds its coefficients again, within 0.1 % as it takes
-    the chip in narrower pieces than the forces do.
+    Two slots whose forces are those of a known material: the fit finds its coefficients again.
 
     >>> import chipload
     >>> mill = chipload.Cutter(diameter_mm=10, flutes=3, helix_deg=30, flute_length_mm=22, overhang_mm=35,
@@ -121,8 +120,8 @@ def fit(
     ...     cuts.append(measured_cut("slot", np.tile(turn.force_n, (4, 1)), rate_hz=36000, feed_mm_min=fz * 3 * 3000,
     ...                              speed_rpm=3000, engagement=slot))
     >>> found = fit(cuts, mill).coefficients.values
-    >>> found.round().tolist(), bool((abs(found / [1000.0, 300.0, 200.0, 10.0, 5.0, 2.0] - 1.0) < 0.01).all())
-    ([1001.0, 300.0, 200.0, 10.0, 5.0, 2.0], True)
+    >>> found.round().tolist(), bool((abs(found / [1000.0, 300.0, 200.0, 10.0, 5.0, 2.0] - 1.0) < 0.004).all())
+    ([1000.0, 300.0, 200.0, 10.0, 5.0, 2.0], True)
     """
     mill = straight_cutter(cutter)
     if method not in ("average", "instantaneous"):

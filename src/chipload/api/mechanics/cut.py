@@ -20,6 +20,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import CutterTable
 from chipload.cutting.material import Material, need_directions
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
+from chipload.engagement.tooth_surfaces import STEADY, chips_of_teeth
 from chipload.errors import InputError
 from chipload.ranges import number_field, require_ranges
 from chipload.units import rad_s_from_rpm
@@ -163,6 +164,17 @@ def engaged_ranges(
     return engagement_of_arcs(
         np.full(count, entry), np.full(count, exit_), feed_per_tooth_mm, cutter, engagement.axial_depth_mm
     )
+
+
+def chips_of_cut(cutter: Cutter, engagement: CutEngagement, feed_per_tooth_mm: float) -> ToothEngagement:
+    """Return the chips that the teeth cut in one steady cut, in the pieces in which a fit takes them.
+
+    Raises
+    ------
+    InputError
+        As :func:`engaged_ranges`.
+    """
+    return chips_of_teeth(engaged_ranges(cutter, engagement, feed_per_tooth_mm), cutter, STEADY)
 
 
 def speeds_rad_s(speed_rpm: ArrayLike) -> Floats:

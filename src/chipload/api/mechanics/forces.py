@@ -11,7 +11,7 @@ import numpy as np
 from chipload.api.mechanics.cut import (
     CutEngagement,
     Floats,
-    engaged_ranges,
+    chips_of_cut,
     material_with_directions,
     read_only,
     speeds_rad_s,
@@ -20,7 +20,6 @@ from chipload.api.mechanics.cut import (
 from chipload.api.values import AnyCutter
 from chipload.cutting.force import forces_over_turn, greatest_forces, mean_forces
 from chipload.cutting.material import Material, texts_beyond_range
-from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 
 #: fewest and most rotations of a turn
@@ -113,7 +112,7 @@ def tooth_forces(
         raise InputError(f"speed_rpm of shape {omega.shape}: must be one number")
     if isinstance(rotations, bool) or not ROTATIONS[0] <= rotations <= ROTATIONS[1]:
         raise InputError(f"rotations = {rotations}: must be from {ROTATIONS[0]} to {ROTATIONS[1]}")
-    chips = chips_of_teeth(engaged_ranges(mill, engagement, feed_per_tooth_mm), mill)
+    chips = chips_of_cut(mill, engagement, feed_per_tooth_mm)
     theta = np.arange(rotations) * (math.tau / rotations)
     force, torque = forces_over_turn(chips, mill, metal, theta)
     mean, mean_torque = mean_forces(chips, mill, metal)

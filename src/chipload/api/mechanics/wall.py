@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from chipload.api.mechanics.cut import (
     CutEngagement,
     Floats,
-    engaged_ranges,
+    chips_of_cut,
     material_with_directions,
     read_only,
     straight_cutter,
@@ -19,7 +19,6 @@ from chipload.api.mechanics.cut import (
 from chipload.api.values import AnyCutter
 from chipload.cutting.material import Material
 from chipload.cutting.wall_error import wall_profile
-from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 
 #: heights where none are stated
@@ -103,7 +102,7 @@ def wall_form_error(
             f"engagement: {engagement.entry_deg:g} to {engagement.exit_deg:g} deg: {found}: must begin at 0 or end at "
             "180, not both"
         )
-    chips = chips_of_teeth(engaged_ranges(mill, engagement, feed_per_tooth_mm), mill)
+    chips = chips_of_cut(mill, engagement, feed_per_tooth_mm)
     heights = np.linspace(0.0, engagement.axial_depth_mm, HEIGHTS) if height_mm is None else height_mm
     profile = wall_profile(
         chips, mill, metal, heights, milling="up" if up else "down", work_compliance=work_um_n / 1000.0
