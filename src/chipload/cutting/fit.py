@@ -94,7 +94,7 @@ class FitSearch:
     Parameters
     ----------
     parameters, spread : (p,) and (p, p) float, runout and x as fitted and their covariance, for the bands
-    freedom : observations less parameters
+    freedom : of the covariance: observations less parameters, or less where it is known from few blocks of turns
     harmonics : how many count
     converged : whether the search ended by itself
     """

@@ -17,9 +17,12 @@ errors are not independent: with P = (J'J)^-1 J', B blocks of whole turns in eac
 
     C_turns = sum over cuts of sum_b g_b g_b' / (B (B - 1)),   g_b = P (y_b - mean y).
 
-What the model does not fit is in the residuals r, with leverages l: C_fit = P diag(r^2 / (1 - l)) P', which is also
-valid where some harmonics are fitted worse than others. Noise of the samples is in both: C is the greater of them in
-each direction, C_turns + the part of C_fit - C_turns whose eigenvalues are above 0.
+What the model does not fit is in the residuals r, with leverages l, beside the errors of the turns, whose variance v
+the blocks state: C_fit = P diag(s r^2 / (1 - l)) P', which is also valid where some harmonics are fitted worse than
+others. s is the share that is not of the turns, 1 - sum v / sum r^2 / (1 - l) of a channel of a cut, at least 0. The
+covariance is C = C_turns + C_fit. With B - 1 degrees of freedom of each cut and those of the residuals, each element of
+its diagonal has those of Welch and Satterthwaite, its square over the sum of the squares of its parts over their own;
+the harmonic mean over the coefficients is stated.
 
 Reference: [Kline1983], runout.
 """
@@ -285,7 +288,8 @@ def _final_fit(problem: _Problem, q: Floats, converged: bool) -> Fit:
     sure = s > WEAK * s[0]
     leverage = np.minimum(np.sum(u[:, sure] ** 2, axis=1), 1.0 - 1e-6)
     inverse = (vt[sure].T / s[sure]) @ u[:, sure].T / scale[:, None]
-    covariance = _covariance(problem, inverse, left / np.sqrt(1.0 - leverage))
+    more = len(y) - int(sure.sum())
+    covariance, freedom = _covariance(problem, inverse, left / np.sqrt(1.0 - leverage), more)
     free = np.sum(vt[sure] ** 2, axis=0) > 1.0 - WEAK
     linear = x[:6]
     identified = (there & determined)[:6] & free[f + m : f + m + 6]
@@ -303,22 +307,24 @@ def _final_fit(problem: _Problem, q: Floats, converged: bool) -> Fit:
     zero = x[6:].reshape(f, 3) if problem.seek_zero else np.zeros((f, 3))
     channels = FittedChannels(np.mod(q[:f], math.tau), zero, problem.resonance, residual, r2)
     found = np.concatenate([runout_of(runout), linear])
-    search = FitSearch(found, spread, len(y) - int(sure.sum()), problem.harmonics, converged)
+    search = FitSearch(found, spread, freedom, problem.harmonics, converged)
     return conclude_fit(
         "instantaneous", problem.cuts, problem.turns, runout, linear, identified, channels, search, notes
     )
 
 
-def _covariance(problem: _Problem, inverse: Floats, left: Floats) -> Floats:
-    """Return the covariance of all unknowns: see the module.
+def _covariance(problem: _Problem, inverse: Floats, left: Floats, more: int) -> tuple[Floats, int]:
+    """Return the covariance of all unknowns, and its degrees of freedom: see the module.
 
     Parameters
     ----------
     inverse : (unknowns, m) P
     left : (m,) residuals over the root of 1 - leverage
+    more : residuals less unknowns
     """
     turns, at = np.zeros((len(inverse), len(inverse))), 0
     size = 2 * problem.harmonics + 1
+    model, squares = left**2, np.zeros(len(inverse))
     for cut, one in zip(problem.cuts, problem.turns, strict=True):
         some, many = np.flatnonzero(cut.measured), len(one.blocks)
         differ = np.zeros((many, len(some) * size))
@@ -329,17 +335,26 @@ def _covariance(problem: _Problem, inverse: Floats, left: Floats) -> Floats:
                 [as_real(block[: problem.harmonics + 1, c]) for block in one.blocks]
             )
         at += len(some) * size
+        if many < 2:  # a turn: how turns differ is not known
+            continue
+        differ -= differ.mean(axis=0)
         g = differ @ inverse[:, rows].T
-        g -= g.mean(axis=0)
-        if many > 1:
-            turns += g.T @ g / (many * (many - 1))
-    fit = (inverse * left**2) @ inverse.T
-    if not turns.any():  # a turn each: how they differ is not known
-        return np.asarray(fit)
-    scale = np.sqrt(np.maximum(np.diagonal(fit), np.finfo(float).tiny))
-    values, vectors = np.linalg.eigh((fit - turns) / np.outer(scale, scale))
-    more = (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale)
-    return np.asarray(turns + more)
+        own = g.T @ g / (many * (many - 1))
+        turns += own
+        squares += np.diagonal(own) ** 2 / (many - 1)
+        of_turns = np.sum(differ**2, axis=0).reshape(len(some), size).sum(axis=1) / (many * (many - 1))
+        whole = model[rows].reshape(len(some), size).sum(axis=1)
+        share = np.maximum(1.0 - of_turns / np.where(whole > 0.0, whole, 1.0), 0.0)
+        model[rows] *= np.repeat(share, size)
+    fit = (inverse * model) @ inverse.T
+    if more < 1:
+        return np.asarray(turns + fit), more
+    squares += np.diagonal(fit) ** 2 / more
+    variance = np.diagonal(turns + fit)
+    first = len(problem.cuts) + problem.unknowns
+    some = first + np.flatnonzero(variance[first : first + 6] > 0.0)
+    freedom = 1.0 / np.mean(squares[some] / variance[some] ** 2) if len(some) else more
+    return np.asarray(turns + fit), max(int(freedom), 1)
 
 
 def _quality(problem: _Problem, q: Floats, x: Floats) -> tuple[Floats, Floats]:
