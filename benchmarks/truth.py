@@ -1,6 +1,7 @@
 """Random ordinary cuts against the true paths of the teeth: how many are within the stated error.
 
     python benchmarks/truth.py [NUMBER] [--first SEED] [--kind KIND ...] [--results FILE] [--chips N] [--walls N]
+        [--verdicts N]
 
 Each cut is a program that chipload.simulate runs at its default settings, with steps of 0.5 to 2 mm: a flat, ball,
 bull-nose, tapered or barrel mill of 3 to 20 mm, 2 to 6 teeth, a helix of 20 to 50 deg, a depth of 0.1 to 2 diameters (a
@@ -9,7 +10,9 @@ milling, runout of 0 to 15 µm, a fifth uneven pitch, and coefficients that vary
 solid material. The oracles, ``tests/engagement/tooth_paths.py`` and ``helix_paths.py``, use no code of the package.
 ``--chips`` compares the chips of a number of flat and ball mills alone, without a simulation. ``--walls`` compares the
 greatest form error of a number of walls that helical flat mills finish, most of them in down milling. ``--results``
-appends one line for each cut to a file, and runs no cut again that stands in it.
+appends one line for each cut to a file, and runs no cut again that stands in it. ``--verdicts`` states limits of force
+and torque near the true loads of other cuts, and counts the verdicts that are wrong: a limit that holds below the true
+load, or is exceeded above it (by nominal loads and at 95 % in turn; runout and coefficients are known).
 
 Compared are the greatest force over all directions, the greatest torque and the mean torque, in the middle of the cut.
 The exit code is 1 where fewer than 99 % are within the stated error, one is beyond twice that, or the median of the
@@ -104,7 +107,8 @@ def mill_of(cut: Cut) -> Cutter:
     """The cutter of a cut."""
     return Cutter(
         cut.D, cut.N, math.radians(cut.helix), 3.0 * cut.D, 4.0 * cut.D, 6e5, runout=(cut.e, cut.lam),
-        corner_radius=0.5 * cut.D if cut.ball else cut.corner, pitch=tuple(cut.pitches) if cut.pitch else (),
+        runout_size=None if cut.e else 0.0, corner_radius=0.5 * cut.D if cut.ball else cut.corner,
+        pitch=tuple(cut.pitches) if cut.pitch else (),
         taper=math.radians(cut.taper), corner_e=cut.hub or None, barrel_radius=cut.barrel or None,
     )  # fmt: skip
 
@@ -152,8 +156,10 @@ def oracle_resolution(cut: Cut) -> tuple[int, int]:
     return rotations, min(max(800, math.ceil(400.0 / max(share, 1e-3))), 100_000)
 
 
-def errors_of_simulation(cut: Cut, K: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """True errors (3,) of the loads in the middle of a straight cut, and the stated ones."""
+def simulated_cut(
+    cut: Cut, K: np.ndarray, step: float, limits: chipload.Limits, checks: chipload.CheckSettings | None = None
+) -> chipload.History:
+    """Return the simulation of a straight cut through a block, 4 diameters long."""
     mill, speed = mill_of(cut), 300.0
     side = cut.D / 2.0 - cut.ae
     y = -side if cut.up else side
@@ -167,15 +173,25 @@ def errors_of_simulation(cut: Cut, K: np.ndarray, step: float) -> tuple[np.ndarr
             plunge([length - 0.2 * cut.D, y, -cut.ap], feed, speed, 1, "cut"),
         ]
     )
-    found = chipload.simulate(
+    return chipload.simulate(
         program, chipload.Stock.block((0.0, edge[0], low), (length, edge[1], 0.0)), mill,
-        Material("m", *K, source="made up"), "vmc", chipload.Limits(force_n=1e6),
+        Material("m", *K, source="made up", covariance=1e-12 * np.diag(K * K)), "vmc", limits, checks=checks,
         settings=chipload.SimulationSettings(step),
     )  # fmt: skip
-    known = true_loads(cut, K, *oracle_resolution(cut))[:3] * np.array([1.0, 1e-3, 1e-3])
+
+
+def loads_in_the_middle(found: chipload.History, cut: Cut) -> np.ndarray:
+    """Greatest loads (3,) where the cut is steady."""
     x = found["x_mm"]
     middle = (x > 1.6 * cut.D) & (x < 2.6 * cut.D)
-    worst = np.array([found[name][middle].max() for name in COLUMNS])
+    return np.array([found[name][middle].max() for name in COLUMNS])
+
+
+def errors_of_simulation(cut: Cut, K: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """True errors (3,) of the loads in the middle of a straight cut, and the stated ones."""
+    found = simulated_cut(cut, K, step, chipload.Limits(force_n=1e6))
+    known = true_loads(cut, K, *oracle_resolution(cut))[:3] * np.array([1.0, 1e-3, 1e-3])
+    worst = loads_in_the_middle(found, cut)
     stated = found.numbers["resolution_error"]
     return worst / known - 1.0, np.array([stated[name] for name in COLUMNS])
 
@@ -242,6 +258,45 @@ def error_of_wall(cut: Cut, K: np.ndarray, overhang: float) -> tuple[float, floa
     return greatest / known - 1.0, numbers["resolution_error"]["form_error_um"]
 
 
+def verdicts_of(seed: int) -> list[tuple[str, float, float, str, bool]]:
+    """The two limits of a random cut: name, limit over the true load, stated error, state, whether it is right.
+
+    A load of the whole program may be greater where the cutter enters or leaves the block, which the oracle does not
+    know: there a limit may be exceeded that the steady cut does not exceed.
+    """
+    g, kind = np.random.default_rng(seed + 2), kind_of(seed)
+    cut, K = random_cut(seed, "flat" if kind == "helix" else kind)
+    known = true_loads(cut, K, *oracle_resolution(cut))[:2] * np.array([1.0, 1e-3])
+    shares = np.exp(g.uniform(-0.12, 0.12, 2))
+    force, torque = (float(x) for x in known * shares)
+    checks = chipload.CheckSettings(confidence=0.5 if seed % 2 else 0.95)
+    found = simulated_cut(cut, K, 1.0, chipload.Limits(force_n=force, torque_nm=torque), checks)
+    steady = loads_in_the_middle(found, cut)
+    out = []
+    for i, check in enumerate(found.limits[:2]):
+        elsewhere = check.worst is None or check.worst > steady[i] * (1.0 + 1e-9)
+        state, share = check.state.value, float(shares[i])
+        right = share >= 1.0 if state == "holds" else share < 1.0 or elsewhere if state == "exceeds" else True
+        out.append((check.name, share, check.error, state, right))
+    return out
+
+
+def say_verdicts(seeds: range) -> bool:
+    """Print how often each state is said, below and above the true load; whether none is wrong."""
+    every = [(seed, *each) for seed in seeds for each in verdicts_of(seed)]
+    for at in (0.5, 0.95):
+        mine = [each for each in every if (each[0] % 2 == 1) == (at == 0.5)]
+        for text, below in (("below", True), ("above", False)):
+            some = [each[4] for each in mine if (each[2] < 1.0) == below]
+            states = ", ".join(f"{some.count(state)} {state}" for state in ("holds", "unproven", "exceeds"))
+            print(f"verdicts at {100.0 * at:g} %, limit {text} the true load: {states}")
+    wrong = [each for each in every if not each[5]]
+    for seed, name, share, error, state, _ in wrong:
+        print(f"  wrong: seed {seed} ({kind_of(seed)}), {name} at {share:.4f} of the truth {state}, stated {error:.4f}")
+    print(f"{len(wrong)} of {len(every)} verdicts are wrong", flush=True)
+    return not wrong
+
+
 def say(name: str, off: np.ndarray, stated: np.ndarray) -> bool:
     """Print the share within the stated error; whether it is right."""
     size = np.abs(off)
@@ -302,6 +357,7 @@ def main() -> int:
     parser.add_argument("--results", type=Path)
     parser.add_argument("--chips", type=int, default=0)
     parser.add_argument("--walls", type=int, default=0)
+    parser.add_argument("--verdicts", type=int, default=0)
     given = parser.parse_args()
     right = True
     for kind in ("flat", "ball") if given.chips else ():
@@ -312,6 +368,8 @@ def main() -> int:
     if given.walls:
         walls = np.array([error_of_wall(*random_wall(s)) for s in range(given.first, given.first + given.walls)])
         right &= say("walls, form_error_um", *walls.T)
+    if given.verdicts:
+        right &= say_verdicts(range(given.first, given.first + given.verdicts))
     found: dict[str, list[tuple[int, np.ndarray, np.ndarray]]] = {kind: [] for kind in given.kind}
     nothing, known = 0, read_results(given.results)
     for seed in range(given.first, given.first + given.number):
