@@ -203,6 +203,7 @@ class TextRules:
     unread : codes that are known and not read: what they do
     codes : codes that mean something else: the code that they are read as, ``idle`` or ``unread``
     no_corners : codes whose block has words behind a comma that make no corner
+    bare_chamfers : C of G1 without a comma is a chamfer on a machine without an axis C
     """
 
     refuses_unknown: bool
@@ -213,6 +214,7 @@ class TextRules:
     unread: Mapping[int, str]
     codes: Mapping[int, str]
     no_corners: tuple[int, ...]
+    bare_chamfers: bool
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ class Dialect:
     def begin(self, c: Controller, text: str) -> None:
         """What stands before the first block."""
 
-    def prepare(self, text: str) -> str:
+    def prepare(self, text: str, c: Controller) -> str:
         """The text as the others write it."""
         return text
 

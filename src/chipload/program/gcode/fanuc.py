@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 
 from chipload.errors import InputError
 from chipload.program.corners import Corner
+from chipload.program.gcode.bare_chamfers import with_commas
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.coordinates import change_coordinates
 from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_Q, PeckRule
@@ -123,13 +124,14 @@ HAAS_EXTENDED, HAAS_TIP = 1540, 2340
 class Fanuc(Dialect):
     """See above."""
 
-    def prepare(self, text: str) -> str:
+    def prepare(self, text: str, c: Controller) -> str:
         """A program number may begin with : instead of O; with words behind it, that is a block number. The first line
         may hold the name of a file ($A.MIN%), that of the program in <>. A comment ends at its first ), whatever it
-        holds.
+        holds. A chamfer may stand without a comma.
         """
         text = _NAME.sub(r"(\1)", _FILE.sub("%", _PLACE.sub(r"\1N", _COLON.sub(r"\1O", text))))
-        return _NESTED.sub(lambda found: f"({found[0][1:].replace('(', '[')}", text)
+        text = _NESTED.sub(lambda found: f"({found[0][1:].replace('(', '[')}", text)
+        return with_commas(text, c)
 
     def begin(self, c: Controller, text: str) -> None:
         """System variables, and numbers without a decimal point."""

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.program.gcode.bare_chamfers import has_bare_chamfers
 from chipload.program.gcode.feed_words import COMMENTS
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,7 @@ _WORD = re.compile(
 _CODE = re.compile(r"(?<![A-Za-z_])[gG]\s*0*(\d+(?:\.\d)?)(?![\d.])")
 #: a corner that is rounded or chamfered moves the ends of its lines
 _CORNER = re.compile(r",\s*[RCrc]|\b(?:RNDM?|CHF|CHR|FRCM?)\b", re.IGNORECASE)
+_ANY_CORNER = re.compile(rf"{_CORNER.pattern}|[Cc]\s*[0-9.]", re.IGNORECASE)
 #: codes that may stand in a line that is divided; all of them are modal
 _PLAIN = {
     "1", "2", "3", "17", "18", "19", "20", "21", "40", "64", "70", "71", "90", "91", "91.1", "90.1", "94", "95", "700",
@@ -92,6 +94,7 @@ def line_forms(text: str) -> dict[int, LineForm]:
     """Return the forms of all lines of a text, from 1; O(length)."""
     out: dict[int, LineForm] = {}
     absolute, unit, compensated, inverse, centre, corner = True, 1.0, False, False, False, False
+    corners = _ANY_CORNER if has_bare_chamfers(text) else _CORNER
     for number, raw in enumerate(text.split("\n"), 1):
         open_text = COMMENTS.sub(lambda found: " " * len(found[0]), raw).rstrip()
         codes = _CODE.findall(open_text)
@@ -112,11 +115,11 @@ def line_forms(text: str) -> dict[int, LineForm]:
             reason = "radius compensation"
         elif inverse:
             reason = "inverse time feed"
-        elif corner or _CORNER.search(open_text):
+        elif corner or corners.search(open_text):
             reason = "rounded corner"
         elif words is not None and _plain(words, codes):
             reason = ""
-        corner = _CORNER.search(open_text) is not None if open_text.strip() else corner
+        corner = corners.search(open_text) is not None if open_text.strip() else corner
         out[number] = LineForm(reason, absolute, unit, centre, words or ())
     return out
 

@@ -124,7 +124,7 @@ def read_gcode(
         swivel=swivel,
     )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    text = rule.prepare(user_tasks(text) if control.text.user_tasks else text)
+    text = rule.prepare(user_tasks(text) if control.text.user_tasks else text, controller)
     rule.begin(controller, text)
     # a Sinumerik has no O-words: ORIWKS and the label OUT: are none
     source = read_source(text, name) if control.text.o_words else Source(name, lines_of(text, name))
