@@ -280,8 +280,37 @@ def test_what_is_refused_or_unproven():
     assert (
         read(fanuc(rotation(30.0, 0.0, 0.0)).replace("G53.1", "G53.1\nG54"), "fanuc", cradle)[0].motion == ARC
     ).any()
-    text = fanuc(rotation(30.0, 0.0, 0.0)).replace("G68.2", "G68.2 P1")
-    assert any("Euler angles" in f.text for f in read(text, "fanuc", cradle)[1])
+    for wrong in ("G68.2 P4", "G68.2 P1 Q122.", "G68.2 P2 Q0.", "G68.2 R5.", "G68.2 P2 Q1."):
+        text = fanuc(rotation(30.0, 0.0, 0.0)).replace("G68.2", wrong)
+        commands, findings = read(text, "fanuc", cradle)
+        assert any("G68.2: " in f.text and f.severity >= Severity.UNPROVEN for f in findings), wrong
+        assert not (commands.motion == ARC).any()
+
+
+@pytest.mark.parametrize("name", ("xyzac-trunnion", "dmu50"))
+@pytest.mark.parametrize("how", ("P1", "P1 Q321", "P1 Q213", "P2", "P3"))
+def test_other_words_of_a_tilted_plane(name, how):
+    """Turns about fixed axes in three orders, three points, two vectors: the angles and points by SciPy."""
+    machine, R = machine_named(name), rotation(35.0, 70.0, 10.0)
+    x, y, z = (R.apply(np.eye(3)[k]) for k in range(3))
+    at = numbers("XYZ", ORIGIN)
+    if how == "P2":
+        points = (ORIGIN, ORIGIN + 30.0 * x, ORIGIN + 20.0 * y - 7.0 * x)
+        words = "\n".join(f"G68.2 P2 Q{k + 1} {numbers('XYZ', p)}" for k, p in enumerate(points))
+    elif how == "P3":
+        words = f"G68.2 P3 Q1 {at} {numbers('IJK', 2.0 * x)}\nG68.2 P3 Q2 {numbers('IJK', 0.5 * z)}"
+    else:
+        order = how[4:] or "123"
+        axes = ["XYZ"[int(k) - 1] for k in order]
+        angles = dict(zip(axes, R.as_euler("".join(axes).lower(), degrees=True), strict=True))
+        words = f"G68.2 {how} {at} {numbers('IJK', [angles[axis] for axis in 'XYZ'])}"
+    text = "\n".join(words if line.startswith("G68.2") else line for line in fanuc(R).split("\n"))
+    commands, findings = read(text, "fanuc", machine)
+    program, more = to_work(commands, machine)
+    assert not [f for f in (*findings, *more) if f.severity >= Severity.UNPROVEN]
+    first = int(np.flatnonzero(program.feed > 0.0)[0]) - 1
+    np.testing.assert_allclose(program.p_work[first : first + 5], R.apply(PATH) + ORIGIN, atol=1e-6)
+    np.testing.assert_allclose(program.axis[first + 1], z, atol=1e-7)
 
 
 def test_rotations():

@@ -20,6 +20,7 @@ from chipload.program.gcode import arcs
 from chipload.program.gcode.cycles import PeckRule
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.parameters import Parameters
+from chipload.program.gcode.plane_words import PlaneBlocks
 from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, Nine, PointMemory, State, nine
 from chipload.program.gcode.tilted_plane import machine_of, position_of
 from chipload.program.gcode.tool_rows import ToolRows
@@ -109,6 +110,8 @@ class Controller:
         self.scaled: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
         #: plane in which a rotary axis takes the place of a linear one (G12.1, G7.1); None: none
         self.interpolation: Interpolation | None = None
+        #: blocks of a tilted plane that is stated in several (G68.2 P2, P3)
+        self.plane_blocks = PlaneBlocks()
         #: macro that is called after each motion (G66), and the level of calls at which it was stated
         self.modal_macro: tuple[MacroCall, int] | None = None
         self.label = 0

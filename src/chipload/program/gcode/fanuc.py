@@ -6,13 +6,13 @@ calls O1234 five times. Fine boring (G76) is carried out without its shift in th
 shifts by Q against X, which leaves it unproven, as the machine's own setting says where to and the cutter is round. G33
 has its lead in F. Macro statements and calls (G65, G66) are those of :mod:`~chipload.program.gcode.macros`; polar,
 scaled and mirrored coordinates (G16, G51, G51.1) of :mod:`~chipload.program.gcode.coordinates`; G12, G13 and G70 to G72
-of a Haas of :mod:`~chipload.program.gcode.haas_cycles`. G68 turns about Z. A tilted plane (G68.2 X Y Z I J K, Haas
-G268) has an origin and Euler angles; G53.1 (G253) turns the tool along its normal
-(:mod:`~chipload.program.gcode.tilted_plane`).
+of a Haas of :mod:`~chipload.program.gcode.haas_cycles`. G68 turns about Z. A tilted plane (G68.2, Haas
+G268) is stated by angles, points or vectors (:mod:`~chipload.program.gcode.plane_words`); G53.1 (G253) turns the tool
+along its normal (:mod:`~chipload.program.gcode.tilted_plane`).
 
 Polar and cylindrical interpolation (G12.1, G7.1) are those of :mod:`~chipload.program.gcode.interpolation_codes`.
 
-Left out, so that the result is unproven: motions in planes that are tilted otherwise (G68.2 P, G68.3, G68 about another
+Left out, so that the result is unproven: motions in planes that are tilted otherwise (G68.2 P4, G68.3, G68 about another
 axis than Z) until they end, tool vectors (G43.5), involutes and splines. Noted and left out: smoothing and look-ahead
 (G5.1, G8), retractions to where only the machine knows.
 """
@@ -47,10 +47,11 @@ from chipload.program.gcode.modal import GROUP_OF, code_text
 from chipload.program.gcode.numbers import count_increments, decide_increments, seconds_of
 from chipload.program.gcode.offsets import choose, probe_motion
 from chipload.program.gcode.other_codes import replace_codes, without_next_tool
+from chipload.program.gcode.plane_words import stated_plane
 from chipload.program.gcode.state import LINEAR, ZERO
 from chipload.program.gcode.tilted_plane import align, at_angles, level, tilt_coordinates
 from chipload.program.gcode.words import Block, bare, read_block
-from chipload.program.tilt import tilt_of, turn_matrix
+from chipload.program.tilt import tilt_of
 
 if TYPE_CHECKING:
     from chipload.program.gcode.flow import Flow
@@ -82,12 +83,12 @@ NOT_READ = {
     435: "tip control by vectors",
     440: "a negative tool length",
 }
-#: tilted planes by Euler angles and the code that turns the tool along their normal, of a Fanuc and of a Haas
+#: tilted planes and the code that turns the tool along their normal, of a Fanuc and of a Haas
 TILTED, ALIGN = (682, 2680), (531, 2530)
 #: G254 and G255 of a Haas: the origin follows the turned table, X, Y and Z stay those of the machine
 DYNAMIC, STATIC = 2540, 2550
-#: what a Haas calls G69, and what names its Euler angles (Q)
-HAAS_UNTILTED, EULER = 2690, 313.0
+#: what a Haas calls G69
+HAAS_UNTILTED = 2690
 #: G53.1 P: the angle of the last rotary axis from the workpiece is positive, or negative
 SIGNS = {0.0: 0, 1.0: 1, 2.0: -1}
 TURNED, UNTURNED, SKIP = 680, 690, 310
@@ -224,21 +225,26 @@ class Fanuc(Dialect):
             level(c)
 
     def _tilt_plane(self, block: Block, c: Controller) -> None:
-        """Tilted planes by Euler angles, and the tool along their normal."""
+        """Tilted planes, and the tool along their normal."""
         words, g = block.words, block.g
+        if c.plane_blocks.waiting and (g or words) and not set(TILTED) & set(g):
+            c.plane_blocks.words = {}
+            remove(c)
+            level(c)
+            leave_out(c, "G68.2: a tilted plane of which a block is missing")
         for code in [code for code in g if code in TILTED]:
             name = code_text(code)
-            euler = words.get("p", 0.0) == 0.0 and words.get("q", EULER) == EULER and "r" not in words
-            given = {x: words.pop(x, 0.0) for x in "xyzijk"}
+            given = dict(words)
             g.remove(code)
             words.clear()
+            plane = stated_plane(given, c.state.scale, c.plane_blocks)
+            if c.plane_blocks.waiting:
+                continue
             remove(c)
-            origin = tuple(given[x] * c.state.scale for x in "xyz")
-            R = turn_matrix("zxz", (given["i"], given["j"], given["k"]))
-            if not euler:
+            if plane is None:
                 level(c)
-                leave_out(c, "G68.2: a tilted plane that is not stated by an origin and Euler angles")
-            elif not tilt_coordinates(c, tilt_of(R, origin)):
+                leave_out(c, f"G68.2: {name}: a tilted plane that is stated by other words than those that are read")
+            elif not tilt_coordinates(c, plane):
                 leave_out(c, f"G68.2: {name}: a tilted plane, and no machine with rotary axes")
         for code in [code for code in g if code in ALIGN]:
             if c.state.datum.tilt is None:
