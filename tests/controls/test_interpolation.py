@@ -144,8 +144,37 @@ def test_along_a_radius_to_the_pole_and_back(tmp_path: Path):
     assert off_segments(cuts(reading)[:, :2], [(30, 0), (20, 20), (0, 0)]) < 1e-3
 
 
-def test_cylindrical_mapping_of_a_haas_is_left_out(tmp_path: Path):
-    """G107 wraps a linear axis: its motions are a finding with their lines, what follows is read."""
-    reading = read(tmp_path, "G0 X0. Y0. Z2.\nG107 A0. Y0. R20.\nG1 Y5. F100.\nG107\nG1 X9. F100.", control="haas")
+WRAP = "G0 X0. Y0. B0. Z50.\n{on}\nG1 X20. F{f}\nG3 Y16. R8.\nG1 X0.\nG107\nG1 Y40. F100.\nG0 Z80."
+
+
+@pytest.mark.parametrize("size", ["R50.", "Q100."])
+def test_a_haas_wraps_a_linear_axis(tmp_path: Path, size):
+    """X about B, a cylinder of 50 mm: a line of 20 mm, a half circle of 8 mm and a line back; then X and Y as before."""
+    reading = read(tmp_path, WRAP.format(f="20.", on=f"G107 B0. X0. {size}"), PALLET, control="haas")
+    assert unread(reading) == []
+    points, r = cuts(reading), 50.0
+    wrapped = points[reading.program.line[reading.program.motion != RAPID] <= 10]
+    np.testing.assert_allclose(np.hypot(wrapped[:, 0], wrapped[:, 1]), r, atol=1e-3)
+    flat = np.column_stack([r * np.arctan2(wrapped[:, 1], wrapped[:, 0]), wrapped[:, 2]])
+    arc = flat[:, 0] > 20.0 + 1e-6
+    np.testing.assert_allclose(np.hypot(flat[arc, 0] - 20.0, flat[arc, 1] - 8.0), 8.0, atol=1e-3)
+    assert off_segments(flat[~arc], [(0, 0), (20, 0), (20, 16), (0, 16)]) < 1e-3
+    assert points[-1].tolist() == pytest.approx([r, 0.0, 40.0], abs=1e-6)
+    lines, seconds = line_times(reading, PALLET)
+    assert seconds[(lines >= 8) & (lines <= 10)].sum() == pytest.approx(60.0 * (40.0 + math.pi * 8.0) / 20.0, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("on", "why"),
+    [
+        ("G107 B0. X0.", "Setting 34"),
+        ("G107 C0. Y0. R20.", "no machine with an axis C"),
+        ("G107 B0. Y0. R20.", "in the plane of G17"),
+        ("G107 B10. X0. R20.", "does not begin at X0"),
+    ],
+)
+def test_a_mapping_that_is_left_out(tmp_path: Path, on, why):
+    """Its motions are a finding with their lines; what follows is read."""
+    reading = read(tmp_path, f"G0 X0. Y0. Z2.\n{on}\nG1 Y5. F100.\nG107\nG1 X9. F100.", PALLET, control="haas")
     assert [(f.line, f.code) for f in unread(reading)] == [(7, "nc-left-out")]
-    assert cuts(reading)[-1, 0] == pytest.approx(9.0)
+    assert why in unread(reading)[0].text

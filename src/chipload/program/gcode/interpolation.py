@@ -48,6 +48,7 @@ class Interpolation:
     plane : that was active before
     last : (9,) where the axes stand at the beginning; then the flat position where the last row ended
     arc_plane : in which arcs lie
+    writes_flat : the text writes the flat coordinate by its own letter, also on a cylinder (G107 of a Haas)
     """
 
     name: str
@@ -60,6 +61,7 @@ class Interpolation:
     plane: int
     last: Nine
     arc_plane: int = XY
+    writes_flat: bool = False
 
     def __post_init__(self) -> None:
         """Take the position of the axes as the flat one."""

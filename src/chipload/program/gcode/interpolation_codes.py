@@ -1,5 +1,7 @@
 """The codes that begin and end polar and cylindrical interpolation: G12.1, G13.1, G7.1 and those of a Haas.
 
+G107 of a Haas wraps a linear axis: Y on the cylinder of radius R is the angle Y / R of A, both from 0.
+
 Reference: Fanuc B-63944EN-1, "Polar Coordinate Interpolation", "Cylindrical Interpolation"; Haas Mill Operator's
 Manual, "G107 Cylindrical Mapping".
 """
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from chipload.program.gcode.words import Block
 
 POLAR, NO_POLAR, CYLINDER = (121, 1120), (131, 1130), 71
-#: cylindrical mapping of a Haas: a linear axis is wrapped
+#: cylindrical mapping of a Haas: the text goes on to write the linear axis that is wrapped
 MAPPED = 1070
 #: linear axis along each rotary one
 ALONG = {"a": "x", "b": "y", "c": "z"}
@@ -81,7 +83,7 @@ def _begin(code: int, words: dict[str, float], c: Controller) -> str:
         c.state.plane = 170
         return ""
     if code == MAPPED:
-        return "cylindrical mapping of a linear axis"
+        return _begin_mapping(words, c, turns)
     given = [letter for letter in "abc" if letter in words]
     if len(given) != 1 or not 0.0 <= words[given[0]] * c.state.scale <= LARGEST:
         raise NotReadError(f"{code_text(code)}: must name one rotary axis with the radius of the cylinder")
@@ -100,5 +102,30 @@ def _begin(code: int, words: dict[str, float], c: Controller) -> str:
     flat = second if linear == first else first
     name = code_text(code)
     made = Interpolation(name, AXES.index(letter), linear, flat, radius, at[flat], ZERO[0], c.state.plane, at, plane)
+    c.interpolate(made)
+    return ""
+
+
+def _begin_mapping(words: dict[str, float], c: Controller, turns: str) -> str:
+    """Begin to wrap a linear axis (G107 A0 Y0 R20.); why it cannot be, empty if it can."""
+    at, name, scale = c.state.at, code_text(MAPPED), c.state.scale
+    rotary, linear = [x for x in "abc" if x in words], [x for x in "xyz" if x in words]
+    if len(rotary) != 1 or len(linear) != 1:
+        raise NotReadError(f"{name}: must name one rotary axis and the linear axis that is wrapped about it")
+    letter, wrapped = rotary[0], linear[0]
+    radius = scale * (words["r"] if "r" in words else 0.5 * words.get("q", 0.0))
+    if letter not in turns:
+        return f"cylindrical mapping, and no machine with an axis {letter.upper()}"
+    if not 0.0 < radius <= LARGEST:
+        return "cylindrical mapping whose radius (R) or diameter (Q) is not stated: Setting 34 gives it"
+    along, flat, plane = AXES.index(ALONG[letter]), AXES.index(wrapped), PLANES[c.state.plane]
+    if {along, flat} != set(PLANE_AXES[plane][:2]):
+        plane_word = code_text(c.state.plane)
+        return f"cylindrical mapping of {wrapped.upper()} about {letter.upper()} in the plane of {plane_word}"
+    if words[letter] != 0.0 or words[wrapped] != 0.0 or abs(at[flat]) > BESIDE:
+        return f"cylindrical mapping that does not begin at {wrapped.upper()}0, with {letter.upper()}0 there"
+    made = Interpolation(
+        name, AXES.index(letter), along, flat, radius, at[flat], ZERO[0], c.state.plane, at, plane, writes_flat=True
+    )
     c.interpolate(made)
     return ""

@@ -41,7 +41,10 @@ def flat_axes(plane: Interpolation, words: dict[str, float], given: dict[int, fl
     """Axes of a block in polar or cylindrical interpolation: the rotary one gives the flat coordinate [mm]."""
     out = {k: value for k, value in given.items() if k != plane.rotary}
     letter = AXES[plane.rotary]
-    if letter in words:
+    if plane.writes_flat:
+        if letter in words:
+            raise InputError(f"{letter.upper()}: not in {plane.name}, in which {AXES[plane.flat].upper()} stands for it")
+    elif letter in words:
         turned = words[letter]
         out[plane.flat] = turned * scale if plane.radius is None else math.radians(turned) * plane.radius
     elif plane.radius is not None and plane.flat in given:
