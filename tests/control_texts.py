@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import cmath
+import math
+
 import numpy as np
 
 from chipload.errors import Severity
-from chipload.program.commands import DWELL
+from chipload.program.commands import ARC, DWELL, LINE
 from chipload.program.control import ControlSettings, control_named
 from chipload.program.control_findings import programmed_minutes
 from chipload.program.gcode.reader import read_gcode
@@ -40,3 +43,21 @@ def minutes(commands):
 def codes(findings):
     """The codes of findings."""
     return [f.code for f in findings]
+
+
+def places(commands):
+    """(place, z) where the tool stands on its cuts, 0.1 mm apart."""
+    for k in range(1, len(commands.motion)):
+        a, b = (complex(*commands.position[j, :2]) for j in (k - 1, k))
+        if commands.motion[k] == LINE:
+            n = max(2, math.ceil(abs(b - a) / 0.1))
+            yield from ((a + (b - a) * i / (n - 1), commands.position[k, 2]) for i in range(n))
+        elif commands.motion[k] == ARC:
+            m, turns = complex(*commands.centre[k]), int(commands.turns[k])
+            sweep = (
+                cmath.phase((b - m) / (a - m)) % math.tau if turns > 0 else -(cmath.phase((a - m) / (b - m)) % math.tau)
+            )
+            if abs(sweep) < 1e-9:
+                sweep = math.copysign(math.tau, turns)
+            n = max(3, math.ceil(abs(sweep) * abs(a - m) / 0.1))
+            yield from ((m + (a - m) * cmath.exp(1j * sweep * i / (n - 1)), commands.position[k, 2]) for i in range(n))

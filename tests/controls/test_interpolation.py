@@ -149,7 +149,7 @@ WRAP = "G0 X0. Y0. B0. Z50.\n{on}\nG1 X20. F{f}\nG3 Y16. R8.\nG1 X0.\nG107\nG1 Y
 
 @pytest.mark.parametrize("size", ["R50.", "Q100."])
 def test_a_haas_wraps_a_linear_axis(tmp_path: Path, size):
-    """X about B, a cylinder of 50 mm: a line of 20 mm, a half circle of 8 mm and a line back; then X and Y as before."""
+    """X about B, a cylinder of 50 mm: a line of 20 mm, a half circle of 8 mm, a line back; then X and Y as before."""
     reading = read(tmp_path, WRAP.format(f="20.", on=f"G107 B0. X0. {size}"), PALLET, control="haas")
     assert unread(reading) == []
     points, r = cuts(reading), 50.0

@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from chipload.program.commands import ARC, LINE, RAPID
+from chipload.program.commands import ARC, RAPID
 from chipload.program.control import control_named
 from chipload.program.gcode.reader import read_gcode
 from chipload.program.heidenhain.reader import read_heidenhain
 from chipload.program.pocket_cycles import levels
-from control_texts import codes, minutes
+from control_texts import codes, minutes, places
 
 RADIUS = 3.0
 SI = "G71 G17 G90 G94 G54\nT1 M6\nS1000 M3\nG0 X0 Y0 Z10\n{}\nM30\n"
@@ -41,24 +41,6 @@ def si(body):
 
 def hh(body):
     return read_heidenhain(HH.format(body), radii={1: RADIUS})[0]
-
-
-def places(commands):
-    """(place, z) where the tool stands on its cuts, 0.1 mm apart."""
-    for k in range(1, len(commands.motion)):
-        a, b = (complex(*commands.position[j, :2]) for j in (k - 1, k))
-        if commands.motion[k] == LINE:
-            n = max(2, math.ceil(abs(b - a) / 0.1))
-            yield from ((a + (b - a) * i / (n - 1), commands.position[k, 2]) for i in range(n))
-        elif commands.motion[k] == ARC:
-            m, turns = complex(*commands.centre[k]), int(commands.turns[k])
-            sweep = (
-                cmath.phase((b - m) / (a - m)) % math.tau if turns > 0 else -(cmath.phase((a - m) / (b - m)) % math.tau)
-            )
-            if abs(sweep) < 1e-9:
-                sweep = math.copysign(math.tau, turns)
-            n = max(3, math.ceil(abs(sweep) * abs(a - m) / 0.1))
-            yield from ((m + (a - m) * cmath.exp(1j * sweep * i / (n - 1)), commands.position[k, 2]) for i in range(n))
 
 
 def ground(commands):

@@ -287,8 +287,8 @@ def test_what_is_refused_or_unproven():
         assert not (commands.motion == ARC).any()
 
 
-@pytest.mark.parametrize("name", ("xyzac-trunnion", "dmu50"))
-@pytest.mark.parametrize("how", ("P1", "P1 Q321", "P1 Q213", "P2", "P3"))
+@pytest.mark.parametrize("name", ["xyzac-trunnion", "dmu50"])
+@pytest.mark.parametrize("how", ["P1", "P1 Q321", "P1 Q213", "P2", "P3"])
 def test_other_words_of_a_tilted_plane(name, how):
     """Turns about fixed axes in three orders, three points, two vectors: the angles and points by SciPy."""
     machine, R = machine_named(name), rotation(35.0, 70.0, 10.0)

@@ -1,4 +1,4 @@
-"""Cycles that mill a pocket: rectangular or circular, from its middle to its wall, pass below pass.
+"""Cycles that mill a pocket, rectangular or circular, from its middle to its wall, or a stud, from its blank inwards.
 
 Notation: x and y from the middle of the pocket, along its length and its width; z in the coordinates of the program
 [mm]. A wall is a rectangle of half sizes a and b whose corners have the radius c; a circle is one of a = b = c. The
@@ -7,10 +7,11 @@ centre of the tool stays ``inset`` within the wall: its radius and the allowance
 
 Each pass enters in the middle, straight down or on a helix, and goes round on rings from the inside out, a step apart.
 The wall, the floor and the levels are those that the cycle states; the way from ring to ring is the control's own, so
-that what it takes from the wall is exact and what the tool bears on its way is not: a reader says so.
+that what it takes from the wall is exact and what the tool bears on its way is not: a reader says so. A stud is gone
+round from outside; the tool goes down 2 mm beside the blank.
 
 References: Siemens, SINUMERIK 840D sl Programming Manual Cycles, "Milling cycles"; Heidenhain, TNC 640 Cycle
-Programming, "Rectangular pocket", "Circular pocket".
+Programming, "Rectangular pocket", "Circular pocket", "Rectangular stud", "Circular stud".
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ MOST_RINGS, MOST_PASSES, MOST_TURNS = 10_000, 10_000, 10_000
 WIDEST_STEP = 1.4
 #: a motion that is shorter is left out [mm]
 SAME_MM = 1e-9
+#: the tool goes down so far beside the blank of a stud [mm]
+BESIDE_BLANK = 2.0
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,52 @@ def finish(pocket: PocketCycle, clear: float, passes: list[float]) -> Iterator[S
         yield from _ring(pocket, pocket.tool_radius, z, True)
         yield _line(0.0, 0.0, z, pocket.feed)
     yield RAPID, 0.0, 0.0, clear, 0.0, (0.0, 0.0), 0
+
+
+def stud(
+    pocket: PocketCycle, blank: tuple[float, float, float], allowance: float, clear: float, passes: list[float]
+) -> Iterator[Step]:
+    """Go round a stud from its blank inwards, pass by pass, from ``clear`` above the surface, and back there.
+
+    The rings keep their distance from the wall, so that the outer ones also take the corners of the blank.
+
+    Parameters
+    ----------
+    pocket : its wall as that of a stud; ``sense`` -1 is climb milling here
+    blank : half length, half width and corner radius of what stands before
+
+    Raises
+    ------
+    InputError
+        The blank is smaller than the stud, or there are too many rings.
+    """
+    a, b, corner = blank
+    if a < pocket.a - SAME_MM or b < pocket.b - SAME_MM:
+        raise InputError(
+            f"a blank of {2 * a:g} x {2 * b:g} mm: must be at least the stud of {2 * pocket.a:g} x {2 * pocket.b:g} mm"
+        )
+    reach = _farthest(pocket, (a, b, min(corner, a, b))) - allowance
+    step = min(pocket.step, WIDEST_STEP * pocket.tool_radius)
+    count = max(1, math.ceil(reach / step - 1e-9)) if step > 0.0 else MOST_RINGS + 1
+    if count > MOST_RINGS:
+        raise InputError(f"a stud with a step of {pocket.step:g} mm: must need at most {MOST_RINGS} rings")
+    start = a + BESIDE_BLANK + pocket.tool_radius
+    yield RAPID, start, 0.0, clear, 0.0, (0.0, 0.0), 0
+    for z in passes:
+        yield _line(start, 0.0, z, pocket.plunge_feed)
+        for k in range(1, count + 1):
+            yield from _ring(pocket, -(pocket.tool_radius + allowance + max(reach, 0.0) * (1.0 - k / count)), z, k == 1)
+        yield _line(start, 0.0, z, pocket.feed)
+    yield RAPID, start, 0.0, clear, 0.0, (0.0, 0.0), 0
+
+
+def _farthest(pocket: PocketCycle, blank: tuple[float, float, float]) -> float:
+    """Greatest distance of the border of a blank from the wall of its stud."""
+    a, b, corner = blank
+    c = min(pocket.corner, pocket.a, pocket.b)
+    # a corner of the blank is round about its own centre: the farthest point lies on the line of both centres
+    x, y = (a - corner) - (pocket.a - c), (b - corner) - (pocket.b - c)
+    return max(a - pocket.a, b - pocket.b, math.hypot(max(x, 0.0), max(y, 0.0)) + corner - c)
 
 
 def _line(x: float, y: float, z: float, feed: float) -> Step:

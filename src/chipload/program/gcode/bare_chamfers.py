@@ -15,7 +15,9 @@ from chipload.program.gcode.controller import Controller
 
 _COMMENT = re.compile(r"(\([^()\n]*\)|;[^\n]*)")
 _CODE = re.compile(r"[Gg]\s*0*([0-9]+(?:\.[0-9])?)")
-_CHAMFER = re.compile(r"(?<![,A-Za-z#\[])(?P<before>\s*)(?P<word>[Cc]\s*(?P<length>[0-9]+\.?[0-9]*|\.[0-9]+))(?![0-9.])")
+_CHAMFER = re.compile(
+    r"(?<![,A-Za-z#\[])(?P<before>\s*)(?P<word>[Cc]\s*(?P<length>[0-9]+\.?[0-9]*|\.[0-9]+))(?![0-9.])"
+)
 _LETTER_C = re.compile(r"(?<![,A-Za-z#])[Cc](?![A-Za-z])")
 _IN_PLANE, _OFF_PLANE = re.compile(r"[XxYy]\s*[-+.0-9#\[]"), re.compile(r"[ZzAaBbIiJjKk]\s*[-+.0-9#\[]")
 _ROTARY = re.compile(r"(?<![A-Za-z#])[AaBb]\s*[-+]?[0-9.]")
@@ -27,9 +29,9 @@ _MODES = frozenset({"1", "17", "40", "41", "42", "61", "64", "90", "91", "94"})
 
 
 def has_bare_chamfers(text: str) -> bool:
-    """Whether every C of a text is the chamfer behind a straight motion in the plane, and there is one.
+    r"""Whether every C of a text is the chamfer behind a straight motion in the plane, and there is one.
 
-    >>> has_bare_chamfers("G1 X50. C2. F100."), has_bare_chamfers("G0 C90.\\nG1 X50. C2. F100.")
+    >>> has_bare_chamfers("G1 X50. C2. F100."), has_bare_chamfers("G0 C90.\nG1 X50. C2. F100.")
     (True, False)
     """
     motion, found = "", False

@@ -12,9 +12,9 @@ along its normal (:mod:`~chipload.program.gcode.tilted_plane`).
 
 Polar and cylindrical interpolation (G12.1, G7.1) are those of :mod:`~chipload.program.gcode.interpolation_codes`.
 
-Left out, so that the result is unproven: motions in planes that are tilted otherwise (G68.2 P4, G68.3, G68 about another
-axis than Z) until they end, tool vectors (G43.5), involutes and splines. Noted and left out: smoothing and look-ahead
-(G5.1, G8), retractions to where only the machine knows.
+Left out, so that the result is unproven: motions in planes that are tilted otherwise (G68.2 P4, G68.3, G68 about
+another axis than Z) until they end, tool vectors (G43.5), involutes and splines. Noted and left out: smoothing and
+look-ahead (G5.1, G8), retractions to where only the machine knows.
 """
 
 from __future__ import annotations

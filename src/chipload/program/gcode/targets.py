@@ -43,7 +43,9 @@ def flat_axes(plane: Interpolation, words: dict[str, float], given: dict[int, fl
     letter = AXES[plane.rotary]
     if plane.writes_flat:
         if letter in words:
-            raise InputError(f"{letter.upper()}: not in {plane.name}, in which {AXES[plane.flat].upper()} stands for it")
+            raise InputError(
+                f"{letter.upper()}: not in {plane.name}, in which {AXES[plane.flat].upper()} stands for it"
+            )
     elif letter in words:
         turned = words[letter]
         out[plane.flat] = turned * scale if plane.radius is None else math.radians(turned) * plane.radius

@@ -21,7 +21,7 @@ from collections.abc import Iterator
 
 from chipload.errors import InputError
 from chipload.program.commands import DWELL, LINE, RAPID
-from chipload.program.heidenhain import bore_cycles, patterns, pocket_steps, q_cycles, words
+from chipload.program.heidenhain import bore_cycles, patterns, pocket_steps, q_cycles, surface_steps, words
 from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.state import ConversationalState
 from chipload.program.heidenhain.switches import datum_shift, leave_out
@@ -38,8 +38,8 @@ CHANGES = {8: "mirrored", 10: "turned", 11: "scaled", 26: "scaled"}
 MIRROR, SCALING = 8, 11
 #: factors of scaling
 LEAST_FACTOR, MOST_FACTOR = 1e-6, 100.0
-#: cycles that mill within a hole or a pocket
-MILLING = (*bore_cycles.CYCLES, *pocket_steps.CYCLES)
+#: cycles that mill within a hole or a pocket, a slot, a stud or a face
+MILLING = (*bore_cycles.CYCLES, *pocket_steps.CYCLES, *surface_steps.CYCLES)
 PRESET, PATTERNS, WORKING_PLANE, ROTATION = 247, (220, 221), 19, 10
 _VALUE = re.compile(r"([A-Z. ]*?)\s*([-+]?\d*\.?\d+)\s*$")
 _SPATIAL = re.compile(rf"\b([ABC])\s*([-+]?)\s*({words.VALUE})")
@@ -289,6 +289,20 @@ class Cycles:
                 "nc-pocket-path",
                 f"CYCL DEF {number}: the way within the pocket is the control's own: rings from its middle are taken; "
                 "its wall, floor and passes are those of the cycle",
+            )
+        elif number in surface_steps.CYCLES:
+            steps = surface_steps.surface_steps(number, self._q, radius, s.scale)
+            turn = cmath.rect(1.0, math.radians(surface_steps.angle_of(number, self._q)))
+            if number in surface_steps.PLACED_BY:
+                keys = surface_steps.PLACED_BY[number]
+                x, y = (
+                    f * s.scale * self._q(key, None) + o for f, key, o in zip(s.factor, keys, s.origin, strict=False)
+                )
+                middle = complex(x, y)
+            s.unproven(
+                "nc-pocket-path",
+                f"CYCL DEF {number}: the way of the tool is the control's own: rings or passes of its step are taken; "
+                "its wall, floor and levels are those of the cycle",
             )
         else:
             steps = bore_cycles.bore_steps(number, self._q, radius, s.scale)
