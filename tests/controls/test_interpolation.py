@@ -119,6 +119,8 @@ def test_a_contour_on_a_cylinder(tmp_path: Path):
     assert unread(reading) == []
     points = cuts(reading)
     # Z of the workpiece is along the axis of the pallet, X towards the spindle
+    older = read(tmp_path, body.replace("G7.1", "G107"), PALLET)
+    np.testing.assert_array_equal(cuts(older), points)
     np.testing.assert_allclose(np.hypot(points[:, 0], points[:, 1]), r, atol=1e-3)
     flat = np.column_stack([r * np.arctan2(points[:, 1], points[:, 0]), points[:, 2]])
     arc = flat[:, 0] > 20.0 + 1e-6

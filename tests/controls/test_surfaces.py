@@ -8,8 +8,10 @@ import pytest
 
 from chipload.errors import Severity
 from chipload.program.commands import ARC, LINE
+from chipload.program.control import control_named
+from chipload.program.gcode.reader import read_gcode
 from chipload.program.heidenhain.reader import read_heidenhain
-from control_texts import minutes, places
+from control_texts import codes, minutes, places
 
 R, CELL, HALF = 3.0, 0.125, 32.0
 TEXT = "BEGIN PGM A MM\nTOOL CALL 1 Z S1000\nM3\nL X+5 Y-3 R0 FMAX\nL Z+10 R0 FMAX\n{}\nCYCL CALL\nM30\nEND PGM A MM\n"
@@ -166,3 +168,80 @@ def test_what_is_left_out(body, why):
     commands, findings = hh(body)
     assert any(why in f.text and f.severity > Severity.NOTE for f in findings)
     assert (commands.position[:, 2] >= 0.0).all()
+
+
+SI = "G71 G17 G90 G94 G54\nT1 M6\nS1000 M3\nG0 X0 Y0 Z20\n{}\nM30\n"
+
+
+def si(body):
+    commands, findings = read_gcode(
+        SI.format(body), control=control_named("sinumerik"), lenient=True, diameters={1: 2 * R}
+    )
+    return commands, [f for f in findings if f.severity > Severity.NOTE]
+
+
+def straight_slots(p, count, first, between, radius, length, width):
+    """Distance of points from slots with round ends that begin on a circle, below 0 inside."""
+    out = []
+    for k in range(count):
+        q = p * cmath.exp(-1j * math.radians(first + k * between)) - (radius + 0.5 * length)
+        out.append(rectangle(q, 0.5 * length, 0.5 * width, 0.5 * width))
+    return np.min(out, axis=0)
+
+
+@pytest.mark.parametrize(
+    ("body", "slots"),
+    [
+        ("LONGHOLE(10,0,2,-5,,3,14,1,2,8,10,0,100,500,2.5)", (3, 10.0, 120.0, 8.0, 14.0, 6.0)),
+        ("LONGHOLE(10,0,2,,5,2,14,1,2,8,10,90,100,500,2.5)", (2, 10.0, 90.0, 8.0, 14.0, 6.0)),
+        ("SLOT1(10,0,2,-5,,2,20,9,1,2,8,30,0,100,500,2.5,0,0.3,0,5,400,,0.2)", (2, 30.0, 180.0, 8.0, 20.0, 9.0)),
+        ("SLOT1(10,0,2,-5,,4,20,9,1,2,8,30,90,100,500,2.5,1)", (4, 30.0, 90.0, 8.0, 20.0, 9.0)),
+    ],
+)
+def test_straight_slots_on_a_circle(body, slots):
+    commands, findings = si(body)
+    assert codes(findings) == ["nc-pocket-path"]
+    z, p = ground(commands, 1 + 2j)
+    off = straight_slots(p, *slots)
+    assert (z[off < -0.15] == -5.0).all()
+    assert (z[off > 0.15] == 0.0).all()
+    assert commands.position[-1, 2] == 10.0
+
+
+@pytest.mark.parametrize("finishing", ["", ",0.3,0,5,400"])
+def test_slots_along_a_circle(finishing):
+    z, p = ground(si(f"SLOT2(10,0,2,-5,,3,70,9,1,2,20,30,0,100,500,2.5,0{finishing})")[0], 1 + 2j)
+    off = np.min([arc_slot(p, 20.0, 30.0 + 120.0 * k, 70.0, 9.0) for k in range(3)], axis=0)
+    assert (z[off < -0.15] == -5.0).all()
+    assert (z[off > 0.15] == 0.0).all()
+
+
+@pytest.mark.parametrize("vari", [11, 21, 31, 41])
+@pytest.mark.parametrize(("length", "width"), [(30.0, 14.0), (-30.0, -14.0)])
+def test_a_face_of_a_sinumerik(vari, length, width):
+    commands, findings = si(f"CYCLE71(10,0,2,-5,1,2,{length},{width},30,2.5,4,3,0,500,{vari},0)")
+    assert codes(findings) == ["nc-pocket-path"]
+    z, p = ground(commands, 1 + 2j)
+    q = p * cmath.exp(-1j * math.radians(30.0)) / math.copysign(1.0, length)
+    # the places along a pass are 0.1 mm apart
+    inside = (q.real > 0.05) & (q.real < 29.95) & (q.imag > 0.05) & (q.imag < 13.95)
+    assert (z[inside] == -5.0).all()
+    beyond = 3.0 + 2.0 * R + 0.2
+    far = (q.real < -beyond) | (q.real > 30.0 + beyond) | (q.imag < -beyond) | (q.imag > 14.0 + beyond)
+    assert (z[far] == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("LONGHOLE(10,0,2,-5,,3,5,1,2,8,10,0,100,500,2.5)", "LENG = 5 mm"),
+        ("LONGHOLE(10,0,2,,,3,14,1,2,8,10)", "DP or DPR must be given"),
+        ("SLOT1(10,0,2,-5,,2,20,5,1,2,8,30,0,100,500)", "does not fit"),
+        ("SLOT2(10,0,2,-5,,3,70)", "WID, CPA, CPO, RAD, STA1 must be given"),
+        ("CYCLE71(10,0,2,-5,1,2,30,14,30,2.5,4,3,0,500,51)", "must be 11 to 42"),
+    ],
+)
+def test_slots_and_faces_that_are_not_read(body, why):
+    commands, findings = si(body)
+    assert any(why in f.text for f in findings)
+    assert (commands.position[:, 2] >= 2.0).all()

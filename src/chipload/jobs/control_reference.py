@@ -15,6 +15,7 @@ from chipload.program.gcode.sinumerik_flow import CLOSES
 from chipload.program.gcode.sinumerik_patterns import PATTERNS
 from chipload.program.gcode.sinumerik_pockets import POCKETS
 from chipload.program.gcode.sinumerik_points import POINT_WORDS, POLES
+from chipload.program.gcode.sinumerik_slots import SLOTS
 from chipload.program.gcode.sinumerik_words import CORNERS, CURVES, IDLE, PLACED
 from chipload.program.gcode.sinumerik_words import UNREAD as UNREAD_WORDS
 from chipload.program.heidenhain import cycles, q_cycles, switches
@@ -58,7 +59,7 @@ _FANUC = {
     "polar, scaled and mirrored coordinates": (coordinates.POLAR, coordinates.NO_POLAR, coordinates.SCALED,
                                                coordinates.UNSCALED, *coordinates.MIRRORED, *coordinates.UNMIRRORED),
     "polar and cylindrical interpolation": (*interpolation_codes.POLAR, *interpolation_codes.NO_POLAR,
-                                            interpolation_codes.CYLINDER),
+                                            interpolation_codes.CYLINDER, interpolation_codes.MAPPED),
     "turned coordinates, tilted planes": (fanuc.TURNED, fanuc.UNTURNED, *fanuc.TILTED, *fanuc.ALIGN,
                                           fanuc.HAAS_UNTILTED),
     "macros": (650, 660, 670),
@@ -117,6 +118,7 @@ def _rules(control: Control) -> list[tuple[str, str]]:
         ("an offset for G41 holds", _holds(control)),
         ("first motion of G41", "square to the contour" if control.compensation.square_entry else "to its own end"),
         ("outside corners of G41", _corner(control)),
+        ("C of G1 without a comma", _bare(control)),
         ("parameters", control.lines.parameter_example),
         ("a code that the control does not have", "refused" if control.text.refuses_unknown else "a finding"),
         ("a setting of the machine decides", ", ".join(f"`{x}`" for x in control.ask) or "nothing of this"),
@@ -131,6 +133,10 @@ def _holds(control: Control) -> str:
 
 def _corner(control: Control) -> str:
     return "an arc" if control.compensation.outside_corner == "circle" else "the crossing of the two offsets"
+
+
+def _bare(control: Control) -> str:
+    return "a chamfer, on a machine without an axis C" if control.text.bare_chamfers else "the axis C"
 
 
 def _numbers(control: Control) -> str:
@@ -161,7 +167,6 @@ def _blocks(control: Control, family: bool = False) -> list[str]:
         left |= {code: "involutes" if code == 62 else "splines" for code in fanuc.LEFT_OUT}
         left |= dict(fanuc.CHANGED) | dict(fanuc.NOT_READ)
         left |= {code: what for code, (_, what) in fanuc.NOT_READ_WITH.items()}
-        left |= {interpolation_codes.MAPPED: "cylindrical mapping of a linear axis"}
         if 1500 not in unread:
             left[1500] = "pockets"
     left = {code: what for code, what in left.items() if not (family and code == 760)} | unread
@@ -208,7 +213,7 @@ def _sinumerik(control: Control) -> list[str]:
         ("coordinates", " ".join((*PLACED, "MIRROR", "AMIRROR", "SCALE", "ASCALE", "TRAORI", "TRAFOOF"))),
         ("points and arcs", f"{_codes(10 * g for g in POLES)} {' '.join(sorted(POINT_WORDS))} CR TURN CIP CT"),
         ("patterns of holes", " ".join(PATTERNS)),
-        ("pockets, on rings of their own", " ".join(POCKETS)),
+        ("pockets, slots and faces, on ways of their own", " ".join((*POCKETS, *SLOTS))),
         ("values", "R[ ], fields, DIV MOD TRUNC ROUND POT ATAN2 MINVAL MAXVAL BOUND, TRUE FALSE, DEFINE AS"),
         ("subprograms", "L100 P3, NAME P2, NAME(1, 2), CALL, EXTCALL: %_N_NAME_SPF or PROC in the text, NAME.SPF"),
         ("corners", " ".join(CORNERS)),

@@ -31,8 +31,8 @@ class FaceCycle:
     tool_radius : of the cutter
     step : most between passes
     side : the cutter stops so far beside the face
-    one_way : each pass goes along x; between them the tool goes back above the face
-    inside : the tool goes from pass to pass over the border of the face, not beside it
+    unidirectional : each pass goes along x; between them the tool goes back above the face
+    over_border : the tool goes from pass to pass over the border of the face, not beside it
     feed, between_feed : of the passes, and of the ways between them and down
     """
 
@@ -41,8 +41,8 @@ class FaceCycle:
     tool_radius: float
     step: float
     side: float
-    one_way: bool
-    inside: bool
+    unidirectional: bool
+    over_border: bool
     feed: float
     between_feed: float
 
@@ -68,23 +68,23 @@ def face_steps(face: FaceCycle, clear: float, passes: list[float]) -> Iterator[S
     out = face.tool_radius + face.side
     near, far = -along * out, face.length + along * out
     # from pass to pass the middle of the tool stays over the border
-    low, high = (0.0, face.length) if face.inside else (near, far)
+    low, high = (0.0, face.length) if face.over_border else (near, far)
     for level, z in enumerate(passes):
-        order = places if face.one_way or level % 2 == 0 else places[::-1]
+        order = places if face.unidirectional or level % 2 == 0 else places[::-1]
         yield RAPID, near, order[0], clear, 0.0, (0.0, 0.0), 0
         yield LINE, near, order[0], z, face.between_feed, (0.0, 0.0), 0
         for k, y in enumerate(order):
-            forth = face.one_way or k % 2 == 0
+            forth = face.unidirectional or k % 2 == 0
             ends = (near if k == 0 else low, far if k == count - 1 else high)
             if not forth:
                 ends = (high, near if k == count - 1 else low)
-            if k and not face.one_way:
-                yield LINE, ends[0], y, z, face.feed if face.inside else face.between_feed, (0.0, 0.0), 0
+            if k and not face.unidirectional:
+                yield LINE, ends[0], y, z, face.feed if face.over_border else face.between_feed, (0.0, 0.0), 0
             elif k:
                 yield RAPID, ends[0], y, clear, 0.0, (0.0, 0.0), 0
                 yield LINE, ends[0], y, z, face.between_feed, (0.0, 0.0), 0
             yield LINE, ends[1], y, z, face.feed, (0.0, 0.0), 0
-            if face.one_way:
+            if face.unidirectional:
                 yield RAPID, ends[1], y, clear, 0.0, (0.0, 0.0), 0
-        last = near if count % 2 == 0 and not face.one_way else far
+        last = near if count % 2 == 0 and not face.unidirectional else far
         yield RAPID, last, order[-1], clear, 0.0, (0.0, 0.0), 0

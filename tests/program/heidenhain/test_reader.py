@@ -195,7 +195,7 @@ def test_rigid_tapping_and_reaming_with_q_parameters():
 
 
 def test_a_cycle_that_is_not_read_is_left_out_where_it_is_called():
-    commands, findings = read("L X+0 Y+0 Z+2 FMAX", "CYCL DEF 254 SLOT Q218=60", "L X+5 FMAX M99", "L X+9 FMAX")
+    commands, findings = read("L X+0 Y+0 Z+2 FMAX", "CYCL DEF 255 SLOT Q218=60", "L X+5 FMAX M99", "L X+9 FMAX")
     assert commands.position[:, 0].tolist() == [0.0, 5.0, 9.0]
     assert [(f.code, f.line, f.severity) for f in findings] == [("heidenhain-cycle", 4, Severity.UNPROVEN)]
     with pytest.raises(InputError, match="Q206 is read before it is set"):

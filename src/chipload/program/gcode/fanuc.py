@@ -227,7 +227,7 @@ class Fanuc(Dialect):
     def _tilt_plane(self, block: Block, c: Controller) -> None:
         """Tilted planes, and the tool along their normal."""
         words, g = block.words, block.g
-        if c.plane_blocks.waiting and (g or words) and not set(TILTED) & set(g):
+        if c.plane_blocks.is_open and (g or words) and not set(TILTED) & set(g):
             c.plane_blocks.words = {}
             remove(c)
             level(c)
@@ -238,7 +238,7 @@ class Fanuc(Dialect):
             g.remove(code)
             words.clear()
             plane = stated_plane(given, c.state.scale, c.plane_blocks)
-            if c.plane_blocks.waiting:
+            if c.plane_blocks.is_open:
                 continue
             remove(c)
             if plane is None:

@@ -37,7 +37,7 @@ class PlaneBlocks:
     words: dict[float, dict[str, float]] = field(default_factory=dict)
 
     @property
-    def waiting(self) -> bool:
+    def is_open(self) -> bool:
         """Whether a block of the plane is still missing."""
         return bool(self.words)
 
@@ -52,7 +52,7 @@ def stated_plane(words: Mapping[str, float], scale: float, blocks: PlaneBlocks) 
     blocks : those before it; it is kept there if another one is missing
 
     >>> blocks = PlaneBlocks()
-    >>> stated_plane({"p": 3.0, "q": 1.0, "x": 5.0, "i": 1.0}, 1.0, blocks), blocks.waiting
+    >>> stated_plane({"p": 3.0, "q": 1.0, "x": 5.0, "i": 1.0}, 1.0, blocks), blocks.is_open
     (None, True)
     >>> plane = stated_plane({"p": 3.0, "q": 2.0, "j": -1.0}, 1.0, blocks)
     >>> plane.direction.tolist(), plane.origin

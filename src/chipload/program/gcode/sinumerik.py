@@ -37,6 +37,7 @@ from chipload.program.gcode.sinumerik_flow import flow_step
 from chipload.program.gcode.sinumerik_patterns import PATTERNS, hole_positions
 from chipload.program.gcode.sinumerik_pockets import POCKETS, mill_pocket
 from chipload.program.gcode.sinumerik_points import PLANES, POINT_WORDS, POLES, place_points
+from chipload.program.gcode.sinumerik_slots import SLOTS, mill_slots
 from chipload.program.gcode.sinumerik_swivel import swivel
 from chipload.program.gcode.sinumerik_values import define, element, value_of, without_blanks
 from chipload.program.gcode.sinumerik_words import (
@@ -170,7 +171,7 @@ class Sinumerik(Dialect):
         if block.pocket is not None:
             if block.modal or not moves.isdisjoint(block.words) or c.left_out:
                 raise NotReadError(f"{block.pocket[0]}: beside MCALL or a motion")
-            mill_pocket(*block.pocket, c)
+            (mill_slots if block.pocket[0] in SLOTS else mill_pocket)(*block.pocket, c)
         elif block.pattern is not None:
             block.after = _pattern_blocks(*block.pattern, c)
         elif block.modal:
@@ -420,7 +421,7 @@ def _call_named(block: Block, c: Controller, name: str, arguments: str) -> None:
         leave_out(c, f"{name}: changed coordinates")
     elif name in CYCLES:
         block.hole = (name, [value_of(x, c) if x.strip() else None for x in arguments.split(",")])
-    elif name in POCKETS:
+    elif name in POCKETS or name in SLOTS:
         block.pocket = name, [value_of(x, c) if x.strip() else None for x in arguments.split(",")]
     elif name in PATTERNS:
         block.pattern = name, [value_of(x, c) if x.strip() else None for x in arguments.split(",")]
