@@ -79,6 +79,11 @@ POSTS = [
     ('T1\nG21\n(Tool: V-Bit {90 deg 0.5"})\nG0X25.', 1.0, "chamfer mill", {"d": 12.7, "bottom": 45.0}),
     ("(Required tools:)\n(End mill 3mm)\nG21", 1.0, "end mill", {"d": 3.0}),
     ('; 1/8" flat end mill\nG21 ; mm', 1.0, "end mill", {"d": 3.175}),
+    # a text by hand with one tool, in words, by a variable, and by the settings of a CAM program
+    ("( the Cutter is assumed to be a 10mm ball nose )\n#<t> = 2\nT#<t> M6", 1.0, "ball nose", {"d": 10.0, "r": 5.0}),
+    ('(tool 4 is 1" in diameter and must be in the tool table)\nT4 M6', 1.0, None, {"d": 25.4}),
+    (";torus_radius = 0.25\n;tool_radius = 0.79375\nT1 M6", 1.0, None, {"d": 1.5875}),
+    ("(T2 DRILL 8.5 DIA HOLES)", 1.0, "drill", {"d": 8.5}),
     # Brother
     ("(T3 D=6 CR=0 - RIGHT HAND TAP)\nG100 T3 X10. Y10. G43 Z30. H3", 1.0, "tap", {"d": 6.0}),
 ]  # fmt: skip
@@ -105,6 +110,11 @@ def test_a_comment_of_a_post(text: str, mm: float, kind: str | None, stated: dic
         "(OP 10 SIDE 2)\nT1 M6",
         "(T100)",
         "(Tool: 6 mm high)",
+        '(Cutter does not descend more than 0.94" below top)\nG0 X1',
+        "(Engraving a 37 tick, 300.0 degree, 1.700 dia bezel)\nG0 X1",
+        "(END MILL, 12 MM DEEP)\nT1 M6",
+        "(T1 END MILL FOR THE 40. DIA BORE)",
+        ";tool_radius = 0.79375\nG0 X1\nT1 M6\nT2 M6",
     ],
 )
 def test_comments_that_describe_no_tool(text: str) -> None:
@@ -210,3 +220,26 @@ def test_pecks_go_back_into_their_own_hole_in_layers(tmp_path: Path) -> None:
     )
     assert "rapid" not in out.splitlines()[0], out + error
     assert code in (0, 3)
+
+
+POCKETS = {
+    "part.mpf": "; T1 D=6 CR=0 - ZMIN=-5 - flat end mill\nG71 G17 G90 G94 G54\nT1 M6\nS8000 M3\nG0 X0 Y0 Z10\n"
+    "POCKET4(10,0,2,-5,12,15,10,2.5,0,0,500,100,0,11,4)\nM30\n",
+    "part.h": "BEGIN PGM A MM\n; T1 D=6 CR=0 - ZMIN=-5 - flat end mill\nTOOL CALL 1 Z S8000\nM3\nL X+15 Y+10 R0 FMAX\n"
+    "L Z+10 R0 FMAX\nCYCL DEF 252 POCKET Q215=0 Q223=24 Q366=0 Q370=1.3 Q207=500 Q351=1 Q201=-5 Q202=2.5 Q206=100 "
+    "Q200=2 Q203=+0 Q204=10 Q385=400\nCYCL CALL\nM30\nEND PGM A MM\n",
+}
+
+
+@pytest.mark.parametrize("name", POCKETS)
+def test_the_pocket_of_a_tool_that_a_comment_states(tmp_path: Path, name: str) -> None:
+    """A pocket of 24 mm is cut by the 6 mm of the comment: the block that is drafted holds its path, 5 mm deep."""
+    (tmp_path / name).write_text(POCKETS[name])
+    code, output, _ = call("init", str(tmp_path / name), str(tmp_path / "job"))
+    assert code == 0, output
+    assert "known" not in output
+    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
+    assert job["cutter"][0]["diameter_mm"] == 6.0
+    low, high = job["stock"]["low_mm"], job["stock"]["high_mm"]
+    assert high[0] - low[0] >= 2 * (12.0 - 3.0)
+    assert low[2] <= -5.0

@@ -32,7 +32,7 @@ MILL = Cutter(10.0, 4, math.radians(30.0), 20.0, 30.0, 5.8e5, number=1)
         ("G21\n(T2 = 0.5 INCH END MILL)", {2: 12.7}),
         ("(T1 D=10.)\n(T1 D=6.)", {1: 10.0}),
         ("(Tool: 1/8 in Carbide End Mill)", {}),
-        ('(tool 4 is 1" in diameter and must be defined in the tool table)', {}),
+        ('(tool 4 is 1" in diameter and must be defined in the tool table)', {4: 25.4}),
         ("(change tool 3 at 100 mm)", {}),
         ("T1 D10 M6", {}),
         ("( T1 | 10. FLAT ENDMILL | H1 | D1 | WEAR COMP | TOOL DIA. - 10. )", {1: 10.0}),

@@ -31,6 +31,8 @@ _CHANGE = re.compile(r"(?<![A-Z_<\[#])(?:M0?6(?![0-9.])|G100(?![0-9.]))|\bTOOL\s
 _TOOL_WORD = re.compile(r"(?:(?<![A-Z_<\[#])T\s*|\bTOOL\s+CALL\s+)([0-9]{1,8})(?![0-9.=])", re.IGNORECASE)
 _MOTION = re.compile(r"(?<![A-Z_<\[#])[XYZ]\s*[-+.0-9\[#]", re.IGNORECASE)
 _RETRACTION = re.compile(r"(?<![A-Z])(?:G(?:28|30|53)(?![0-9.])|M91\b)|\b(?:SUPA|BLK\s+FORM)\b", re.IGNORECASE)
+_BY_VARIABLE = re.compile(r"(?<![A-Z_<\[#])T\s*(?P<key>#(?:<[^<>\n]+>|[0-9]{1,6}))", re.IGNORECASE)
+_ASSIGNMENT = re.compile(r"^\s*#(?:<[^<>\n]+>|[0-9]{1,6})\s*=")
 #: a text that names a tool
 _NAMES_TOOLS = re.compile(r"\bTOOL\s+(?:DEF|CALL)\b|(?<![A-Z_])T\d*\s*=", re.IGNORECASE)
 #: CutViewer, Carbide Create: kind of the tool and its numbers
@@ -41,7 +43,8 @@ _OFFSETS = re.compile(
 )
 #: a name or a size of the tool on a line of its own, without its number
 _OWN_LINE = re.compile(
-    r"^\s*(?:TOOL\s*(?:NAME|DESCRIPTION|DESC|DIAMETER|DIA|TYPE)?|TC|WERKZEUG|OUTIL)\b\.?\s*[-:=]", re.IGNORECASE
+    r"^\s*(?:TOOL[\s_]*(?:NAME|DESCRIPTION|DESC|DIAMETER|DIA|RADIUS|TYPE)?|TC|WERKZEUG|OUTIL)\b\.?\s*[-:=]",
+    re.IGNORECASE,
 )
 #: a size with which the words about a tool begin
 _SIZE_FIRST = re.compile(r"\s*(?:[0-9]+/[0-9]+|[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9./])")
@@ -68,7 +71,7 @@ def stated_tools(text: str, mm: float) -> dict[int, Stated]:
     """
     out: dict[int, Stated] = {}
     # of a long program hardly any line speaks of a tool
-    text = _MOTIONS.sub("X0\n", text)
+    text = _with_numbers(_MOTIONS.sub("X0\n", text))
     for number, words, comment in _described_tools(text):
         own = out.setdefault(number, {})
         for key, stated in _statement(words, mm, comment).items():
@@ -108,6 +111,16 @@ def stated_diameters(text: str, unit: str = "mm") -> dict[int, StatedDiameter]:
                 where = f"the comment ({' '.join(comment.upper().split())[:60]})"
                 out[number] = StatedDiameter(float(value[0]), where, line)
     return out
+
+
+def _with_numbers(text: str) -> str:
+    """The text with the numbers of tools that it calls by a variable that it sets once, to a whole number."""
+
+    def number(found: re.Match[str]) -> str:
+        values = re.findall(rf"{re.escape(found['key'])}\s*=\s*([^\s(;]*)", text, re.IGNORECASE)
+        return f"T{values[0]}" if len(values) == 1 and values[0].isdigit() else found[0]
+
+    return _BY_VARIABLE.sub(number, text)
 
 
 def _numbered_tools(comment: str) -> Iterator[tuple[int, str]]:
@@ -161,19 +174,25 @@ def _at_changes(text: str) -> Iterator[tuple[int, str]]:
             if below:
                 yield waiting, below[0].strip()
                 waiting = 0
-            above = [*above, *(_comments_of(line) or [""])][-ABOVE:]
+            # lines that only set a variable do not count
+            own = _comments_of(line) or ([""] if words.strip() and not _ASSIGNMENT.match(words) else [])
+            above = [*above, *own][-ABOVE:]
 
 
 def _only_tool(text: str) -> Iterator[tuple[int, str, str]]:
-    """The comment on the tool of a text that never changes it, number 0, where one describes a tool."""
+    """The comment on the tool of a text that has one tool, where one describes a tool: number 0 without a change, else
+    by a line of its own that names the tool.
+    """
     code = COMMENT.sub(" ", text)
-    if _CHANGE.search(code) or _NAMES_TOOLS.search(code):
+    changes = _CHANGE.search(code) is not None
+    numbers = {int(number) for number in _TOOL_WORD.findall(code)} - {0} if changes else {0}
+    if len(numbers) != 1 or _NAMES_TOOLS.search(code):
         return
     spoken = [c for line in text.splitlines() for c in _comments_of(line)]
-    comments = dict.fromkeys(c.strip() for c in spoken if _describes(c))
+    comments = dict.fromkeys(c.strip() for c in spoken if _describes(c) and (_OWN_LINE.match(c) or not changes))
     if len(comments) == 1 and not any(True for c in spoken for _ in _numbered_tools(c)):
         comment = next(iter(comments))
-        yield 0, comment, comment
+        yield numbers.pop(), comment, comment
 
 
 def _names_another(comment: str, number: int) -> bool:

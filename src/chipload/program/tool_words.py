@@ -45,6 +45,7 @@ class ToolKind(Enum):
     PROBE = "probe"
 
 
+_MAKES_HOLES = frozenset({ToolKind.DRILL, ToolKind.SPOT, ToolKind.TAP, ToolKind.REAMER, ToolKind.BORING})
 #: words of each kind, the first that is found decides
 _KINDS = (
     (ToolKind.DRILL, r"\bTAP\s*-?\s*DRILL|KERNLOCH"),
@@ -78,7 +79,7 @@ _SIZE = rf"(?:[0-9]+[- ][0-9]+/[0-9]+|[0-9]+/[0-9]+|{_N})(?![0-9./])"
 _FREE = r"(?<![-+.0-9/A-Z])"
 #: what is measured by numbers that are no diameter: taken out of the text, the first group being the value
 _CORNER = re.compile(
-    rf"(?:\bCR\s*[=:]?|\bCORNER\s*-?RAD(?:IUS)?\.?\s*[-=:]?|(?<![A-Z])R\s*[=:]?)\s*({_SIZE})\s*({_UNIT})?"
+    rf"(?:\bCR\s*[=:]?|\bTORUS\s+RADIUS\s*[=:]|\bCORNER\s*-?RAD(?:IUS)?\.?\s*[-=:]?|(?<![A-Z])R\s*[=:]?)\s*({_SIZE})\s*({_UNIT})?"
     rf"|{_FREE}({_SIZE})\s*({_UNIT})?\s*(?:CR|R|RAD|RADIUS|CORNER\s*-?RAD(?:IUS)?)\b(?!\s*[=:]?\s*[.0-9])"
 )
 _ANGLE = re.compile(
@@ -99,12 +100,18 @@ _OVERHANG = re.compile(
 _OTHER = re.compile(
     rf"\bZ(?:MIN|MAX)\s*=\s*[-+]?{_N}|\b[HD]\s?[0-9]{{1,3}}(?![0-9./]|\s*{_UNIT}|\s*R)|\b(?:DIA|LEN)\.?\s*OFF(?:SET)?\.?"
     rf"\s*[-=:]?\s*[0-9]+|\bLEN\.?\s*[-=]\s*[0-9]+(?=\s)|\b(?:OAL|TL|GL|L|LEN(?:GTH)?)\s*[=:]?\s*{_SIZE}\s*{_UNIT}?"
-    rf"|{_FREE}{_SIZE}\s*{_UNIT}?\s*(?:OAL|LG|LONG)\b|\bER\s?[0-9]{{2}}\b|\b(?:HSK|CAT|BT|SK)\s*-?[0-9]{{2}}\b"
+    rf"|{_FREE}{_SIZE}\s*{_UNIT}?\s*(?:OAL|LG|LONG|BELOW|ABOVE|UNDER|DEEP|DEPTH|DOC|TALL|HIGH|THICK)\b|\bER\s?[0-9]{{2}}\b|\b(?:HSK|CAT|BT|SK)\s*-?[0-9]{{2}}\b"
     r"|\bTOOL\s*#?\s*[0-9]+\b"
 )
 _DIAMETER = re.compile(
     rf"(?:\bDM|\bD(?=\s*[=:])|\bD(?=[0-9.])|\bD(?=\s+{_SIZE}\s*{_UNIT})|Ø|\b(?:DIAMETER|DIAM|DIA)\.?)\s*[-=:]?\s*({_SIZE})\s*({_UNIT})?"
-    rf"|{_FREE}({_SIZE})\s*({_UNIT})?\s*-?\s*(?:DIA|DIAM|DIAMETER)\b"
+    rf"|{_FREE}({_SIZE})\s*({_UNIT})?\s*-?\s*(?:IN\s+)?(?:DIA|DIAM|DIAMETER)\b"
+)
+_RADIUS = re.compile(rf"\bTOOL\s+RADIUS\s*[=:]\s*({_SIZE})\s*({_UNIT})?")
+#: a diameter of the workpiece: that of the tool only where it makes the hole
+_OF_PART = re.compile(
+    rf"{_FREE}{_SIZE}\s*{_UNIT}?\s*-?\s*(?:DIAMETER|DIAM|DIA)\b\.?\s+(?:OF\s+(?:THE\s+)?)?(?:HOLES?|BORES?|POCKETS?|CIRCLE|"
+    r"BOLT|BOSS|PART|RINGS?|BEZEL|STOCK|BLANK|DISCS?|DISKS?|WHEEL|ROUND|BAR|SHAFT|TUBE)\b"
 )
 #: name of a tool with its diameter behind it: ``EM12R1``
 _NAMED = re.compile(rf"\b(?:EM|BEM|BNM|BM|FM|DR|DRL|MILL|DRILL|CUTTER|REAM(?:ER)?)\s?({_SIZE})\s*({_UNIT})?")
@@ -136,8 +143,10 @@ def names_diameter(text: str, unit: bool = False) -> bool:
     >>> names_diameter("D16R0.8"), names_diameter("IS 5 MM ABOVE THE PART")
     (True, False)
     """
-    words = _plain(text)
-    return _DIAMETER.search(words) is not None or (unit and _WITH_UNIT.search(words) is not None)
+    words = _without_part(_plain(text), kind_of(text))
+    return any(p.search(words) is not None for p in (_DIAMETER, _RADIUS)) or (
+        unit and _WITH_UNIT.search(words) is not None
+    )
 
 
 def describe_tool(text: str, mm: float, where: str = "") -> Stated:
@@ -162,7 +171,12 @@ def describe_tool(text: str, mm: float, where: str = "") -> Stated:
         if pattern.search(words):
             out.setdefault("modulus_gpa", (modulus, f"{body}: {where}"))
     taper = re.search(r"\bTAPER\s*[=:]", words) is not None
+    of_part = _without_part(words, kind) != words
+    words = _without_part(words, kind)
     keyed, words = _take_length(_DIAMETER, words, mm)
+    radius, words = _take_length(_RADIUS, words, mm)
+    if keyed is None and radius is not None:
+        keyed = 2.0 * radius
     words, numbers = _measures(words, mm)
     for key, value in numbers.items():
         if key != "angle":
@@ -173,12 +187,17 @@ def describe_tool(text: str, mm: float, where: str = "") -> Stated:
         diameter = thread[0]
         if thread[1] is not None:
             out["thread_pitch_mm"] = (thread[1], where)
-    if diameter is None:
+    if diameter is None and not of_part:
         diameter = _first_size(words, kind, mm)
     if diameter is not None and diameter > 0.0:
         out["diameter_mm"] = (diameter, where)
     out.pop("corner_radius_mm", None)
     return out | _tip(kind, diameter, numbers, taper, where)
+
+
+def _without_part(words: str, kind: ToolKind | None) -> str:
+    """Words without the diameters of the workpiece that their tool does not have."""
+    return words if kind in _MAKES_HOLES else _OF_PART.sub(" ", words)
 
 
 def _plain(text: str) -> str:

@@ -117,8 +117,10 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     apt = kind is not None and is_cl_data(kind)
     text = conversational(known.text if known.text is not None else _text(path, apt))
     header = read_header(text, apt, unit_mm(text, chosen.reading.unit))
-    if any(f.code == "nc-diameter-unknown" for f in chosen.reading.findings):
-        chosen = _read(path, known, _cutters(chosen.reading.program, known, header))
+    if any(f.code in (*LEFT_OUT, "nc-diameter-unknown") for f in chosen.reading.findings):
+        # cycles of a pocket and compensation need the diameters
+        cutters = _cutters(chosen.reading.program, known, header)
+        chosen = _read(path, known, cutters) if cutters else chosen
     program = chosen.reading.program
     if not float(lengths(program).sum()) > 0.0:
         left_out = next((f": {f}" for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN), "")
