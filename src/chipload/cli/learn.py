@@ -120,7 +120,7 @@ def learn(
             clock = (
                 "" if stated_line else f", starts at {number_text(one.lag)} s, {number_text(one.rate)} times as long"
             )
-            sensor = f", the sensor lags by {number_text(one.sensor_lag, 2)} s" if one.sensor_lag > 0.0 else ""
+            sensor = f", the sensor lags by {number_text(one.sensor_lag, 2)} s" if one.sensor_lag >= 0.01 else ""
             show(f"{one.name}: correlation {one.correlation:.3f}{clock}{sensor}")
         write_whole(out, material_text(found.material).encode("utf-8"))
         for line in lines_of(found):
