@@ -15,7 +15,6 @@ from chipload.control.fuzzy import (
     mamdani,
     product_sum,
     read_fuzzy,
-    sample_output,
     standard,
     surface,
 )
@@ -23,6 +22,27 @@ from chipload.errors import InputError
 
 TABLE = standard()
 GRID = np.arange(-48, 49) * 0.025
+
+
+def _memberships(centres, x: float):
+    return np.array([np.interp(x, centres, row) for row in np.eye(len(centres))])
+
+
+def sample_output(table: FuzzyTable, error: float, change: float, points: int) -> float:
+    """Return the Mamdani output by sampling at ``points`` places: the formula as written, slow, as a reference."""
+    a, b = _memberships(table.error, error), _memberships(table.change, change)
+    first, last = table.output[0], table.output[-1]
+    low = first - (table.output[1] - first) if table.whole_ends else first
+    high = last + (last - table.output[-2]) if table.whole_ends else last
+    y = np.linspace(low, high, points)
+    knots = np.concatenate([[2 * first - table.output[1]], table.output, [2 * last - table.output[-2]]])
+    cut = np.zeros(points)
+    for i in range(len(a)):
+        for j in range(len(b)):
+            k = int(table.rules[i, j])
+            triangle = np.interp(y, knots[k : k + 3], [0.0, 1.0, 0.0], left=0.0, right=0.0)
+            cut = np.maximum(cut, np.minimum(min(a[i], b[j]), triangle))
+    return float(np.trapezoid(cut * y, y) / np.trapezoid(cut, y))
 
 
 def test_the_rules_are_clip_of_i_plus_j():

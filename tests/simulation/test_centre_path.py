@@ -6,7 +6,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.simulation.centre_path import TOUCH_MM, CentrePath, rim_engagement
-from chipload.simulation.material import material_left_of
+from left_material import material_left_of
 
 R, S = 5.0, 0.1
 
@@ -137,7 +137,7 @@ def test_workers_do_not_matter():
 
 def test_open_chain_bounds_a_half_plane():
     chain = Contour.polyline([[0, 0], [10, 0]])
-    region = material_left_of([chain], 100.0)
+    region = material_left_of(chain, 100.0)
     assert region.contains([[5, 1], [5, -1], [-40, 1], [60, -1]]).tolist() == [True, False, True, False]
 
 

@@ -9,8 +9,8 @@ from chipload.errors import Cancelled, InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.program.program import ARC_CCW, LINE, RAPID, Program
 from chipload.simulation import verify as verify_module
-from chipload.simulation.material import material_left_of
 from chipload.simulation.verify import MATCH_MM, verify_contour
+from left_material import material_left_of
 
 R, S, RC, Z, SAFE = 5.0, 0.1, 8.0, -6.0, 5.0
 SHALLOW = np.degrees(np.arccos(1 - S / R))
@@ -90,7 +90,7 @@ def finish_rows(step=0.25, run=30.0):
 
 
 WALL = corner(RC)
-STOCK = material_left_of([corner(RC - 2 * S).reversed()], 1000.0)
+STOCK = material_left_of(corner(RC - 2 * S).reversed(), 1000.0)
 
 
 def verify(p, rows, **options):

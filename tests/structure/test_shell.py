@@ -15,7 +15,6 @@ from chipload.structure.shell import (
     compliance,
     equivalent,
     greatest_stress,
-    left_out,
     ovalisation,
     ritz,
     stress,
@@ -42,26 +41,6 @@ def test_along_the_wall():
     """The published numbers inside the wall were made with 20 terms; with all of them the wall is 3 % softer there."""
     published = ritz(TUBE, harmonics=80, terms=20)
     np.testing.assert_allclose(normal(published, [15.0, 30.0, 45.0, 60.0]), [0.29, 0.44, 0.70, 1.94], rtol=0.005)
-
-
-def test_what_is_left_out(tube):
-    """Short waves see a plate: few terms with their remainder agree with many."""
-    s = np.array([10.0, 15.0, 30.0, 45.0])
-    few = ritz(TUBE, harmonics=40, terms=20)
-    best = normal(tube, s) + 1e3 * left_out(tube, s)
-    np.testing.assert_allclose(normal(few, s) + 1e3 * left_out(few, s), best, rtol=0.005)
-    assert np.all(normal(few, s) < 0.99 * best)
-
-
-def test_what_more_terms_add_is_what_is_left_out_less():
-    """From 24 to 48 terms, all else alike, by the difference of their remainders: s (L - s) (1 / 24^2 - 1 / 48^2) over
-    8 pi D, D = 70000 / (12 (1 - 0.33^2)) N mm."""
-    s = np.array([20.0, 30.0, 40.0])
-    low, high = (ritz(TUBE, harmonics=200, terms=n) for n in (24, 48))
-    stiffness = 70e3 / (12.0 * (1.0 - 0.33**2))
-    expected = s * (60.0 - s) * (24.0**-2 - 48.0**-2) / (8.0 * math.pi * stiffness)
-    np.testing.assert_allclose(left_out(low, s) - left_out(high, s), expected, rtol=1e-9)
-    np.testing.assert_allclose(normal(high, s) - normal(low, s), 1e3 * expected, rtol=0.1)
 
 
 @pytest.mark.parametrize(("angle_deg", "um_n"), [(10.0, 3.14), (-10.0, 0.849)])

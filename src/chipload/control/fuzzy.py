@@ -196,23 +196,6 @@ def mamdani(table: FuzzyTable, error: ArrayLike, change: ArrayLike) -> Floats:
     return out.reshape(e.shape)
 
 
-def sample_output(table: FuzzyTable, error: float, change: float, points: int) -> float:
-    """Return the Mamdani output by sampling at ``points`` places: the formula as written, slow, as a reference."""
-    a, b = _memberships(table.error, error), _memberships(table.change, change)
-    first, last = table.output[0], table.output[-1]
-    low = first - (table.output[1] - first) if table.whole_ends else first
-    high = last + (last - table.output[-2]) if table.whole_ends else last
-    y = np.linspace(low, high, points)
-    knots = np.concatenate([[2 * first - table.output[1]], table.output, [2 * last - table.output[-2]]])
-    cut = np.zeros(points)
-    for i in range(len(a)):
-        for j in range(len(b)):
-            k = int(table.rules[i, j])
-            triangle = np.interp(y, knots[k : k + 3], [0.0, 1.0, 0.0], left=0.0, right=0.0)
-            cut = np.maximum(cut, np.minimum(min(a[i], b[j]), triangle))
-    return float(np.trapezoid(cut * y, y) / np.trapezoid(cut, y))
-
-
 def product_sum(table: FuzzyTable, error: ArrayLike, change: ArrayLike) -> Floats:
     """Return the output of product and sum: output centres interpolated over the rules; shapes as :func:`mamdani`."""
     e, d = _inputs(error, change)
@@ -227,10 +210,6 @@ def surface(table: FuzzyTable, points: int = 61) -> tuple[Floats, Floats, Floats
     e = np.linspace(table.error[0], table.error[-1], points)
     d = np.linspace(table.change[0], table.change[-1], points)
     return e, d, mamdani(table, e[:, None], d[None, :])
-
-
-def _memberships(centres: Floats, x: float) -> Floats:
-    return np.array([np.interp(x, centres, row) for row in np.eye(len(centres))])
 
 
 def _inputs(error: ArrayLike, change: ArrayLike) -> tuple[Floats, Floats]:

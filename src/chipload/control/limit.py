@@ -1,10 +1,8 @@
-"""Allowable force and torque on a thin wall.
+"""Torque limit of a thin wall, from the radial force that it allows.
 
-Notation: s [mm] place along the wall; C_w, C_t [mm/N] compliances of the wall and of the cutter along the wall's
-normal; d [mm] deflection that is allowed, S [MPa] stress that is; F_r, F_t [N] radial and tangential force on the
-cutter; R its radius; A [mm^2] area of the chip, b [mm] depth of cut.
+Notation: F_r, F_t [N] radial and tangential force on the cutter; R its radius; A [mm^2] area of the chip, b [mm] depth
+of cut.
 
-    F_r <= min(d / (C_t + C_w), S / stress of the wall under 1 N),
     F_r = Krc A + Kre b,  F_t = Ktc A + Kte b,   T = R F_t with A from F_r at its limit.
 
 T is the instantaneous torque. The controller holds the mean over a revolution, which is less by the ratio of mean to
@@ -20,75 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.structure.shell import Ritz, compliance, greatest_stress, left_out
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class WallLimit:
-    """Allowable force at places along a wall.
-
-    Parameters
-    ----------
-    s : (k,) float [mm]
-    compliance : (k,) float [mm/N], of the wall, along its normal
-    stress : (k,) float [MPa/N], the greatest equivalent one, at the clamp or under the cutter
-    by_deflection, by_strength : (k,) float [N], radial force at each limit
-    """
-
-    s: Floats
-    compliance: Floats
-    stress: Floats
-    by_deflection: Floats
-    by_strength: Floats
-
-    @property
-    def force(self) -> Floats:
-        """The allowable radial force (k,) [N]."""
-        return np.minimum(self.by_deflection, self.by_strength)
-
-
-def wall_limit(
-    modes: Ritz,
-    s: ArrayLike,
-    tool_compliance: float,
-    deflection: float,
-    stress: float,
-    length: float,
-    width: float,
-) -> WallLimit:
-    """Return the allowable radial force on the wall with the cutter at ``s``.
-
-    Parameters
-    ----------
-    modes : of the wall, from :func:`chipload.structure.shell.ritz`
-    s : float [mm], (k,) or a number, middle of the depth of cut
-    tool_compliance : C_t [mm/N], cutter and holder; 0: rigid
-    deflection : d [mm]
-    stress : S [MPa]
-    length, width : area on which the cutter acts [mm]: depth of cut along s, contact round
-
-    Raises
-    ------
-    InputError
-        A limit is not above 0, or the area does not lie on the wall.
-    """
-    for name, value, unit in (
-        ("deflection", deflection, "mm"),
-        ("stress", stress, "MPa"),
-        ("length", length, "mm"),
-        ("width", width, "mm"),
-    ):
-        if not value > 0.0:
-            raise InputError(f"wall_limit.{name} = {value:g}: must be above 0 {unit}")
-    if not tool_compliance >= 0.0:
-        raise InputError(f"wall_limit.tool_compliance = {tool_compliance:g}: must be at least 0 mm/N")
-    at = np.atleast_1d(np.asarray(s, dtype=np.float64))
-    # the deflection is taken at a point: that is what the cutter's edge leaves
-    wall = compliance(modes, at)[:, 2, 2] + left_out(modes, at)
-    per_newton = np.array([max(greatest_stress(modes, float(x), length, width)) for x in at])
-    return WallLimit(at, wall, per_newton, deflection / (tool_compliance + wall), stress / per_newton)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +43,7 @@ def torque_limit(
 
     Parameters
     ----------
-    force : float [N], (k,) or a number, from :class:`WallLimit`
+    force : float [N], (k,) or a number, that the wall allows
     radius : of the cutter [mm]
     depth : of cut [mm]
     material : coefficients; its radial one must be above 0

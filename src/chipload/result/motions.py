@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.machine.machine import Machine
 from chipload.program.motions import is_arc, lengths, radii, straighten_arcs
 from chipload.program.program import DWELL, Program
-from chipload.program.read import times_on
 from chipload.result.limits import Columns
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
@@ -52,9 +49,3 @@ def motion_columns(program: Program, seconds: NDArray[np.float64]) -> Columns:
         "spindle_rpm": rpm_from_rad_s(1.0) * chords.spindle,
         "tool": chords.tool,
     }
-
-
-def motion_blocks(program: Program, machine: Machine) -> Iterator[Columns]:
-    """Yield the history of a program on a machine in one block; no block if the program has no motion."""
-    if len(program):
-        yield motion_columns(program, times_on(program, machine))

@@ -6,7 +6,6 @@ Notation: a boundary is a set of contours with the MATERIAL ON THE LEFT of trave
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,63 +15,6 @@ from chipload.geometry.contour import JOIN_MM, Contour, Region
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-
-def material_left_of(boundary: Sequence[Contour], reach_mm: float) -> Region:
-    """Return the region of the material on the left of a boundary, within a circle of radius ``reach_mm``.
-
-    Parameters
-    ----------
-    boundary : closed contours (outer ones counter-clockwise, holes clockwise; where the outermost runs clockwise the
-        material is what surrounds it), or one open chain, which is run on along its end tangents
-    reach_mm : radius of the circle about the middle of the boundary [mm]
-
-    Raises
-    ------
-    InputError
-        Open and closed contours are mixed, there are several open chains (which of them bounds a point is not told),
-        or the circle does not surround the boundary.
-
-    Examples
-    --------
-    >>> pocket = Contour.circle((0.0, 0.0), 5.0, sense=-1)
-    >>> material_left_of([pocket], 100.0).contains([[0.0, 0.0], [6.0, 0.0]]).tolist()
-    [False, True]
-    """
-    if not boundary:
-        raise InputError("stock boundary: no contour: pass None as stock for material everywhere")
-    boxes = np.array([c.bounds for c in boundary])
-    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-    centre = 0.5 * (low + high)
-    if reach_mm <= float(np.hypot(*(high - low))):
-        raise InputError(f"stock boundary: reach_mm = {reach_mm:g}: must be above the boundary's size")
-    chains = [c for c in boundary if not c.closed]
-    if not chains:
-        outermost = max(boundary, key=lambda c: abs(c.area))
-        around = () if outermost.area > 0.0 else (Contour.circle((centre[0], centre[1]), reach_mm),)
-        return Region((*around, *boundary))
-    if len(boundary) > 1:
-        raise InputError(f"stock boundary: {len(boundary)} contours of which {len(chains)} open: pass one at a time")
-    chain = chains[0]
-    p, t, _ = chain.at([0.0, chain.length])
-    first = _to_circle(p[0], -t[0], centre, reach_mm)
-    last = _to_circle(p[1], t[1], centre, reach_mm)
-    a, b = (math.atan2(q[1] - centre[1], q[0] - centre[0]) for q in (last, first))
-    rows = [
-        [*first, *p[0], 0.0, 0.0, 0.0],
-        *chain.segments,
-        [*p[1], *last, 0.0, 0.0, 0.0],
-        [*last, *first, *centre, (b - a) % (2.0 * math.pi)],
-    ]
-    return Region((Contour(np.array(rows)),))
-
-
-def _to_circle(p: Floats, direction: Floats, centre: Floats, radius: float) -> Floats:
-    """Return the point where the ray from ``p`` meets the circle."""
-    v = p - centre
-    along = float(v @ direction)
-    hit: Floats = p + direction * (math.sqrt(along**2 + radius**2 - float(v @ v)) - along)
-    return hit
 
 
 def strips(stock: Region | None, low: float, high: float) -> tuple[float, float, int, Ints, Ints, Floats]:

@@ -15,7 +15,7 @@ v_n, w_n integrals of Legendre polynomials that satisfy the end conditions. The 
 factored once, for all loads.
 
 Valid for t / r below about 1/10, small displacements and constant thickness. The solution is never too soft (Ritz).
-Under a point load the deflection converges as 1 / harmonics^2 and 1 / terms^2; :func:`left_out` gives the missing part.
+Under a point load the deflection converges as 1 / harmonics^2 and 1 / terms^2.
 The stress under a point load does not converge: it requires the area on which the load acts.
 
 Reference: [Leissa1973] ch. 1 (Donnell's and Novozhilov's relations for cones); [Timoshenko1959] ch. 15.
@@ -220,25 +220,6 @@ def compliance(
         out[:, :, 2] += even[:, :, 2]
         out[:, :, 1] += odd
     return out.reshape(*shape, 3, 3)
-
-
-def left_out(modes: Ritz, s: ArrayLike) -> Floats:
-    """Contribution of the omitted harmonics and terms to the normal compliance under a point force [mm/N].
-
-    For these short waves the wall acts like an infinite plate: [s (L - s) / terms^2 + r^2 / n_max^2] / (8 pi D). The
-    first part is exact for many terms; near a free edge the second is too small by a factor of 2 to 3. The two
-    overlap slightly.
-
-    Parameters
-    ----------
-    modes : from :func:`ritz`
-    s : float [mm], any shape
-    """
-    shell = modes.shell
-    at = np.asarray(s, dtype=np.float64)
-    bending = shell.modulus * shell.thickness**3 / (12.0 * (1.0 - shell.poisson**2))
-    along = at * (shell.length - at) / modes.terms**2
-    return np.asarray((along + (shell.radius_at(at) / modes.harmonics[-1]) ** 2) / (8.0 * math.pi * bending))
 
 
 def stress(
