@@ -1,10 +1,12 @@
 """Time of programs beside a real LinuxCNC, counted in servo cycles of 1 ms.
 
     python benchmarks/cycle_time.py [--data DIR] [--run | --record]
+    python benchmarks/cycle_time.py --random N [--first SEED]
 
 Without `--run` the counts are those that are recorded in `tests/cycle_counts/cycles.json`; `--run` counts them again
 with the LinuxCNC of this computer (in real time: some ten minutes), `--record` counts the programs that are not
-recorded there yet and writes them.
+recorded there yet and writes them. `--random` counts new programs of lines and arcs that meet at corners, in G64
+without and with P, which are recorded nowhere.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ sys.path.insert(0, str(HERE.parent))
 
 from cycle_counts.clock import cycles_of, machine_of  # noqa: E402
 from cycle_counts.cycles import installed, servo_cycles  # noqa: E402
-from cycle_counts.programs import digest, own_programs, real_programs, recorded  # noqa: E402
+from cycle_counts.programs import digest, own_programs, random_programs, real_programs, recorded  # noqa: E402
 
 
 def counted(programs: dict[str, tuple[str, str]]) -> dict[str, tuple[str, int]]:
@@ -39,8 +41,12 @@ def main() -> int:
     parser.add_argument("--data", type=Path, help="folder of real programs")
     parser.add_argument("--run", action="store_true", help="count again")
     parser.add_argument("--record", action="store_true", help="count what is not recorded yet, and keep it")
+    parser.add_argument("--random", type=int, default=0, help="count this many new programs of lines and arcs")
+    parser.add_argument("--first", type=int, default=1000, help="seed of the first of them")
     args = parser.parse_args()
-    programs = own_programs() | (real_programs(args.data) if args.data else {})
+    own = random_programs(args.first, args.random) if args.random else own_programs()
+    args.run |= args.random > 0
+    programs = own | (real_programs(args.data) if args.data else {})
     if (args.run or args.record) and not installed():
         print("linuxcnc is not installed: apt-get install linuxcnc-uspace", file=sys.stderr)
         return 2

@@ -170,6 +170,21 @@ def own_programs() -> dict[str, tuple[str, str]]:
     return {k: ("XYZ", v) for k, v in three.items()} | {k: ("XYZAC", v) for k, v in five.items()}
 
 
+def random_programs(first: int, number: int) -> dict[str, tuple[str, str]]:
+    """As :func:`own_programs`, lines that meet arcs at corners: G64 without and with P, half circles, any radius."""
+    out = {}
+    for seed in range(first, first + number):
+        g = np.random.default_rng(seed)
+        head = ("G64", "G64", f"G64 P{10.0 ** g.uniform(-2.0, -0.7):.3f}")[seed % 3]
+        if seed % 2:
+            radius = float(10.0 ** g.uniform(-0.1, 0.9))
+            text = _arches(head, round(radius, 3), round(radius * float(g.uniform(0.5, 3.0)), 3))
+        else:
+            text = _corners(head, seed, float(g.uniform(0.3, 0.7)))
+        out[f"random {seed}, {head}"] = ("XYZ", text)
+    return out
+
+
 def real_programs(data: Path) -> dict[str, tuple[str, str]]:
     """As :func:`own_programs`, real texts after a start at the zero of the machine."""
     found = [data / name for name in REAL_FILES if (data / name).exists()]
