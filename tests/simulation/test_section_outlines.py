@@ -8,7 +8,7 @@ from shapely import MultiPolygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.moves.stock import MoveStock
-from chipload.simulation.section_outlines import nested_outlines
+from chipload.simulation.section_outlines import Marks, nested_outlines
 
 HEIGHTS = np.linspace(-9.95, -0.05, 100).tolist()
 
@@ -23,9 +23,9 @@ def test_each_height_has_its_own_outlines(corner: float, levels: list[float]) ->
     stock.skip(p[:-1], p[1:], np.ones(3, dtype=np.int64))
     asked: list[float] = []
 
-    def outlines(z: float) -> MultiPolygon:
+    def outlines(z: float, below: Marks | None, above: Marks | None) -> tuple[MultiPolygon, Marks]:
         asked.append(z)
-        return stock.outlines(z, 0.005)
+        return stock.outlines_between(z, 0.005, below, above)
 
     found = nested_outlines(outlines, HEIGHTS, np.array(levels), 1)
     assert len(asked) == len(set(asked))
@@ -38,4 +38,4 @@ def test_each_height_has_its_own_outlines(corner: float, levels: list[float]) ->
 
 
 def test_nothing_is_asked_without_heights() -> None:
-    assert nested_outlines(lambda z: MultiPolygon(), [], np.array([1.0]), 1) == []
+    assert nested_outlines(lambda z, *_: (MultiPolygon(), np.zeros(1, dtype=bool)), [], np.array([1.0]), 1) == []

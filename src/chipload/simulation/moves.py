@@ -40,7 +40,7 @@ from chipload.lazy import LateModule
 from chipload.program.program import Program
 from chipload.simulation.initial_stock import initial_stock, make_earlier, moves_of, skip_moves
 from chipload.simulation.loads import BANDS, LOADS, ONE_SIDE, Cuts, engaged_work
-from chipload.simulation.section_outlines import nested_outlines
+from chipload.simulation.section_outlines import Marks, nested_outlines
 from chipload.simulation.shank import ShankContact
 from chipload.simulation.steps import ROWS, Steps, steps_in_blocks
 from chipload.stock.earlier_moves import EarlierMoves
@@ -182,8 +182,13 @@ class MoveRun:
         def outlines(z: float) -> MultiPolygon:
             return self.stock.outlines(z, 0.5 * self.tolerance)
 
-        if self.upright:
-            shapes = nested_outlines(outlines, heights, self._levels(), workers)
+        if isinstance(self.stock, MoveStock):
+            left = self.stock
+
+            def between(z: float, below: Marks | None, above: Marks | None) -> tuple[MultiPolygon, Marks]:
+                return left.outlines_between(z, 0.5 * self.tolerance, below, above)
+
+            shapes = nested_outlines(between, heights, self._levels(), workers)
         else:
             with ThreadPoolExecutor(workers) as pool:
                 shapes = list(pool.map(outlines, heights))

@@ -94,9 +94,11 @@ _F1, _F2, _I1 = types.float64[::1], types.float64[:, ::1], types.int64[::1]
 _B2 = types.boolean[:, ::1]
 
 
-@njit(types.void(types.float64, _F1, _F1, INDEX, _F1, _B2), cache=True, nogil=True)
-def mark_nodes(z, xs, ys, index, tops, inside):
-    """Which nodes of a net were swept at a height; ``xs``, ``ys``: nodes, the outermost beside the body, not swept."""
+@njit(types.void(types.float64, _F1, _F1, INDEX, _F1, _B2, _B2, _B2), cache=True, nogil=True)
+def mark_nodes(z, xs, ys, index, tops, below, above, inside):
+    """Which nodes of a net were swept at a height; ``xs``, ``ys``: nodes, the outermost beside the body, not swept.
+    ``below``, ``above``: those that were swept at a lower and at a greater height: only what differs is examined.
+    """
     # the caller keeps all of them
     index = borrow_arrays(index)
     tops = borrow_arrays(tops)
@@ -112,7 +114,10 @@ def mark_nodes(z, xs, ys, index, tops, inside):
         row = place(xs[i], grid[1], grid, index[1])
         hint = np.int64(AIR)
         for j in range(1, m - 1):
-            if row < 0 or column[j] < 0:
+            if below[i, j]:
+                inside[i, j] = True
+                continue
+            if not above[i, j] or row < 0 or column[j] < 0:
                 continue
             found = swept_in(row + column[j], xs[i], ys[j], z, index, tops, hint)
             inside[i, j] = found != MATERIAL

@@ -385,10 +385,24 @@ class MoveStock:
         smallest cutter's circle unless the net would have more than ``NODES`` nodes. Corners are cut off by a chord.
         ``tolerance`` [mm]: by which the outline is made simpler.
         """
+        return self.outlines_between(z, tolerance, None, None)[0]
+
+    def outlines_between(
+        self, z: float, tolerance: float, below: NDArray[np.bool_] | None, above: NDArray[np.bool_] | None
+    ) -> tuple[MultiPolygon, NDArray[np.bool_]]:
+        """Return the outlines at a height as :meth:`outlines`, and the nodes of their net that were swept there.
+
+        Parameters
+        ----------
+        below, above : (n, m) nodes that were swept at a lower, and at a greater height, so that only the others are
+            examined; None: not known
+        """
         xs, ys = nodes_of(self.low, self.high, float(self.grid[2:4].min()), float(self.sides.min()), tolerance)
         inside, index = np.empty((len(xs), len(ys)), dtype=np.bool_), self._index()
-        outline.mark_nodes(z, xs, ys, index, self.tops, inside)
+        below = np.zeros_like(inside) if below is None else below
+        above = np.ones_like(inside) if above is None else above
+        outline.mark_nodes(z, xs, ys, index, self.tops, below, above, inside)
         sides, first = rings(inside)
         points = np.empty((len(sides), 2))
         outline.place_borders(z, xs, ys, index, self.tops, inside, sides, points)
-        return area_of(points, first, tolerance)
+        return area_of(points, first, tolerance), inside
