@@ -31,7 +31,7 @@ ENDINGS = (".nc", ".ngc", ".h", ".mpf", ".apt", ".gcode", ".tap", ".cnc", ".eia"
 #: words of a comment about a tool, and a number that may be its size; not the reader of the product
 _TOOL = re.compile(r"(?i)mill|drill|\btap\b|ream|\bball|fräs|bohrer|\bD=[0-9.]|\bdia\b")
 _COMMENT = re.compile(r"\(([^\n]*)\)|;([^\n]*)")
-_NUMBERED = re.compile(r"(?i)^\W{0,3}(?:T|TOOL\s*[-#:]?\s*|#)(?P<tool>[0-9]{1,4})\b(?P<rest>.*[0-9].*)$")
+_NUMBERED = re.compile(r"(?i)^\W{0,3}(?:TOOL\s*[-#:]?\s*T?|T|#)\s*(?P<tool>[0-9]{1,4})\b(?P<rest>.*[0-9].*)$")
 FEEDS = "[operation.feeds]\nslowest_percent = 50.0\nfastest_percent = 200.0\n\n"
 
 

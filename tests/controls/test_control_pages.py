@@ -24,7 +24,7 @@ def test_every_control_has_its_page(name):
         assert part in text
 
 
-@pytest.mark.parametrize("name", ["fanuc", "haas", "okuma", "mazak"])
+@pytest.mark.parametrize("name", ["fanuc", "haas", "okuma", "mazak", "grbl", "mach3"])
 def test_what_the_page_calls_unread_is_a_finding(name):
     rows = control_page(name).split("## Codes that are not read")[1]
     for code in re.findall(r"^\| (G[0-9.]+) \|", rows, re.MULTILINE):

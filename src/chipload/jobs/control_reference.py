@@ -171,7 +171,8 @@ def _blocks(control: Control, family: bool = False) -> list[str]:
             left[1500] = "pockets"
     left = {code: what for code, what in left.items() if not (family and code == 760)} | unread
     left |= {code: "another meaning here" for code, to in changed.items() if to == "unread"}
-    other = left.keys() | changed.keys()
+    left |= {code: f"changed coordinates, until {code_text(end)}" for code, end in control.text.unread_until.items()}
+    other = left.keys() | changed.keys() | set(control.text.unread_until.values())
     silent = fanuc.IDLE if family else frozenset[int]()
     rows = [(_GROUPS[name], _codes(set(codes) - other - silent)) for name, codes in GROUPS.items()]
     if family:

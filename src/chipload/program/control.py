@@ -201,6 +201,7 @@ class TextRules:
     program_number : programs begin with % and an O number
     user_tasks : statements are those of an Okuma: VC1, CALL O, RTS, IF [ ] N
     unread : codes that are known and not read: what they do
+    unread_until : codes that change the coordinates in a way that is not read, and those that end it
     codes : codes that mean something else: the code that they are read as, ``idle`` or ``unread``
     no_corners : codes whose block has words behind a comma that make no corner
     bare_chamfers : C of G1 without a comma is a chamfer on a machine without an axis C
@@ -212,6 +213,7 @@ class TextRules:
     program_number: bool
     user_tasks: bool
     unread: Mapping[int, str]
+    unread_until: Mapping[int, int]
     codes: Mapping[int, str]
     no_corners: tuple[int, ...]
     bare_chamfers: bool

@@ -68,6 +68,11 @@ class Dialect:
         block = read_block(text, comments, c.parameters)
         if self.strict:
             return block
+        for code in block.g:
+            unread = c.control.text.unread.get(code)
+            if unread is not None:
+                raise NotReadError(f"{code_text(code)}: {unread}")
+        _changed_coordinates(block, c)
         _other_controllers(block, c)
         return lenient(block, c)
 
@@ -83,6 +88,24 @@ class Dialect:
         if not 0 <= times <= MOST_CALLS:
             raise InputError(f"M98: L{times}: must be from 0 to {MOST_CALLS}")
         return str(integer_of(words["p"], "P")), times
+
+
+def _changed_coordinates(block: Block, c: Controller) -> None:
+    """Leave motions out in coordinates that the control knows and that are not read, until they end."""
+    until = c.control.text.unread_until
+    for code in block.g:
+        if c.left_out and any(code == until[begin] and c.left_out == _changes(begin) for begin in until):
+            go_on(c)
+    for code in [code for code in block.g if code in until]:
+        leave_out(c, _changes(code))
+    ours = until.keys() | set(until.values())
+    if not ours.isdisjoint(block.g):
+        block.g = [code for code in block.g if code not in ours]
+        block.words = {x: value for x, value in block.words.items() if x in KEPT_WORDS}
+
+
+def _changes(code: int) -> str:
+    return f"{code_text(code)}: changed coordinates"
 
 
 def _other_controllers(block: Block, c: Controller) -> None:
