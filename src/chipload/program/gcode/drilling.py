@@ -69,12 +69,14 @@ class Drilling:
         """Start a spindle at rest where the cycle of this control does."""
         state, which = self.c.state, self.c.control.cycles.starts_spindle
         tapping = code in cycles.TAPPING
+        # a Haas, and the cycles of a Brother that state the pitch, turn the spindle themselves
+        own = which == "all" or self.c.feed_of_cuts is not None
         if state.sense == 0 and state.speed > 0.0 and (which == "all" or (which == "tapping" and tapping)):
             state.sense = -1 if code == 740 else 1
             self.started = tapping
             self.c.once("nc-cycle-spindle", f"{code_text(code)}: the spindle is at rest: the cycle starts it")
             self.c.changed()
-        elif which == "all" and tapping and state.speed > 0.0 and state.sense != (-1 if code == 740 else 1):
+        elif tapping and own and state.speed > 0.0 and state.sense != (-1 if code == 740 else 1):
             # a tap turns as its cycle asks for, whatever the spindle did before
             state.sense, self.started = -1 if code == 740 else 1, True
             self.c.once("nc-cycle-spindle", f"{code_text(code)}: the cycle turns the spindle the other way")
