@@ -340,8 +340,21 @@ def times_on(program: Program, machine: Machine, tool_lengths: Mapping[int, floa
     ----------
     tool_lengths : [mm] of each tool; one that is not named has 0
     """
-    commands, _ = to_axes(replace(program, line=np.arange(len(program))), machine, tool_lengths=tool_lengths)
-    return _sum_by_row(commands.line, command_times(commands, machine), len(program))
+    return commands_and_times(program, machine, tool_lengths)[1]
+
+
+def commands_and_times(
+    program: Program, machine: Machine, tool_lengths: Mapping[int, float] | None = None
+) -> tuple[Commands, Floats]:
+    """Return the motions of the axes for a program, and :func:`times_on` of it."""
+    rows = replace(program, line=np.arange(len(program)))
+    try:
+        commands, _ = to_axes(rows, machine, tool_lengths=tool_lengths)
+    except InputError:  # a message names the lines of the program
+        to_axes(program, machine, tool_lengths=tool_lengths)
+        raise
+    times = _sum_by_row(commands.line, command_times(commands, machine), len(program))
+    return replace(commands, line=program.line[commands.line]), times
 
 
 def _sum_by_row(row: Ints, seconds: Floats, n: int) -> Floats:

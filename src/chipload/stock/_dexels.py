@@ -308,12 +308,22 @@ def turns(tips, axes, h):
 
 
 @njit(cache=True, nogil=True)
-def cut(k, grid, tol, tips, axes, shape, ends, count):
+def solid_length(ray, ends, count):
+    """Length of the solid intervals of a ray [mm]."""
+    length = 0.0
+    for i in range(count[ray]):
+        length += ends[ray, i, 1] - ends[ray, i, 0]
+    return length
+
+
+@njit(cache=True, nogil=True)
+def cut(k, grid, tol, tips, axes, shape, ends, count, lost):
     """Remove what the cutter covers on its path through the poses from the rays along axis k.
 
     ``grid`` is ``[u0, v0, du, dv, nu, nv]``: the first ray, the distances, the numbers; ray (i, j) is i * nv + j.
-    ``tol`` [mm] is the greatest error of the extremes. Returns False where a ray had no room for its intervals: call
-    it again with more room; intervals already removed stay removed.
+    ``tol`` [mm] is the greatest error of the extremes. The length that the rays lose [mm] is added to ``lost`` (1,).
+    Returns False where a ray had no room for its intervals: call it again with more room; intervals already removed
+    stay removed.
     """
     u0, v0, du, dv = grid[0], grid[1], grid[2], grid[3]
     nu, nv = int(grid[4]), int(grid[5])
@@ -341,15 +351,20 @@ def cut(k, grid, tol, tips, axes, shape, ends, count):
                 else:
                     los[move], his[move] = 1.0, 0.0
             n = np.int64(0)
+            before = -1.0
             while n < m:
                 if los[n] > his[n]:
                     n += 1
                     continue
+                if before < 0.0:
+                    before = solid_length(ray, ends, count)
                 start = n
                 while n < m and los[n] <= his[n]:
                     n += 1
                 done = passage(k, u, v, ray, start, n, los, his, tol, bends, tips, axes, shape, tip, axis, ends, count)
                 room = done and room
+            if before > 0.0:
+                lost[0] += before - solid_length(ray, ends, count)
     return room
 
 

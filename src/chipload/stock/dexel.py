@@ -80,7 +80,9 @@ class TriDexel:
     >>> stock.volume()
     4000.0
     >>> mill = (10.0, 0.0, 5.0, 0.0, 0.0, 0.0, 30.0)
-    >>> stock.remove_move((-10.0, 10.0, 6.0), (0, 0, 1), (30.0, 10.0, 6.0), (0, 0, 1), mill, error_mm=0.001)
+    >>> path = (-10.0, 10.0, 6.0), (0, 0, 1), (30.0, 10.0, 6.0), (0, 0, 1)
+    >>> round(stock.remove_move(*path, mill, error_mm=0.001), 3)
+    800.0
     >>> {k: round(v, 3) for k, v in stock.volume_by_direction().items()}  # a slot 10 wide and 4 deep
     {'x': 3200.0, 'y': 3200.0, 'z': 3200.0}
     """
@@ -145,8 +147,10 @@ class TriDexel:
         samples: int | None = None,
         error_mm: float | None = None,
         tol: float | None = None,
-    ) -> None:
+    ) -> float:
         """Remove the volume that the cutter sweeps: its tip on the line and its axis on the arc between two poses.
+
+        Returns the volume [mm^3] that the solid lost, the mean over the directions.
 
         Parameters
         ----------
@@ -194,13 +198,15 @@ class TriDexel:
         parts = min(samples - 1, max(1, math.ceil(travel / big)))
         borders = np.linspace(0, samples - 1, parts + 1).round().astype(int)
         tips = t0 * (1.0 - t) + t1 * t
-        for a, b in itertools.pairwise(borders):
-            self._remove(tips[a : b + 1], axes[a : b + 1], shape, tol)
+        return math.fsum(
+            self._remove(tips[a : b + 1], axes[a : b + 1], shape, tol) for a, b in itertools.pairwise(borders)
+        )
 
-    def remove_poses(self, tips: ArrayLike, axes: ArrayLike, apt: Sequence[float], *, tol: float = 1e-6) -> None:
+    def remove_poses(self, tips: ArrayLike, axes: ArrayLike, apt: Sequence[float], *, tol: float = 1e-6) -> float:
         """Remove the volume that the cutter sweeps through the poses (n, 3), (n, 3), n >= 2, which are the instants.
 
-        Between two poses tip and axis are interpolated linearly, the axis normalised; ``tol`` as :meth:`remove_move`.
+        Between two poses tip and axis are interpolated linearly, the axis normalised; ``tol`` and what is returned as
+        of :meth:`remove_move`.
         """
         p = np.ascontiguousarray(tips, dtype=np.float64)
         a = np.array([_unit(axis) for axis in np.asarray(axes, dtype=np.float64)])
@@ -208,12 +214,17 @@ class TriDexel:
             raise InputError(
                 f"stock: poses of shapes {p.shape} and {a.shape}: must be (n, 3), n at least 2, and finite"
             )
-        self._remove(p, a, cutter_shape(apt), tol)
+        return self._remove(p, a, cutter_shape(apt), tol)
 
-    def _remove(self, tips: Floats, axes: Floats, shape: Floats, tol: float) -> None:
+    def _remove(self, tips: Floats, axes: Floats, shape: Floats, tol: float) -> float:
+        """Remove what a cutter covers on its path through poses; the volume [mm^3] that this takes."""
+        taken = 0.0
         for rays in self.rays:
-            while not _dexels.cut(rays.k, rays.grid, tol, tips, axes, shape, rays.ends, rays.count):
+            lost = np.zeros(1)
+            while not _dexels.cut(rays.k, rays.grid, tol, tips, axes, shape, rays.ends, rays.count, lost):
                 rays.ends = np.concatenate([rays.ends, np.zeros_like(rays.ends)], axis=1)
+            taken += float(lost[0] * rays.grid[2] * rays.grid[3])
+        return taken / len(self.rays)
 
 
 def _unit(axis: ArrayLike) -> Floats:

@@ -21,7 +21,7 @@ from shapely import MultiPolygon
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.record import MOST, cutter_record
 from chipload.engagement.moves.net import area_of, nodes_of, rings
-from chipload.engagement.moves.stock import INSTANT, Engaged, corner_parts, faces_of, side_radii, walls_of
+from chipload.engagement.moves.stock import INSTANT, Engaged, faces_of, side_radii, tables_of_parts, walls_of
 from chipload.lazy import LateModule, trimesh
 
 _sweep = LateModule("chipload.engagement.bricks._sweep")
@@ -260,9 +260,7 @@ class BrickStock:
         )
         entry, out = np.empty((capacity, 3), dtype=np.int64), np.empty((capacity, 19))
         state = np.array([begin, 0, 0, 0, 0, *self.more])
-        nodes = np.zeros((pieces + 1, pieces, 3))
-        for count in range(1, pieces + 1):
-            nodes[count, :count] = corner_parts(count)
+        nodes = tables_of_parts(pieces)
         at, work = 0, self._work(pieces)
         while True:
             at = int(

@@ -48,9 +48,11 @@ INSTANT = 0.25
 MORE = (3, 25)
 
 
-@lru_cache(64)
+@lru_cache(512)
 def _gauss_nodes(count: int) -> tuple[Floats, Floats]:
-    """Nodes and weights of Gauss and Legendre, which take longer to find than some steps."""
+    """Nodes and weights of Gauss and Legendre, which take longer to find than some steps; as many counts are kept as a
+    step that is calculated a second time asks for.
+    """
     return np.polynomial.legendre.leggauss(count)
 
 
@@ -66,6 +68,20 @@ def corner_parts(count: int) -> Floats:
     node, weight = _gauss_nodes(count)
     end = np.cumsum(0.5 * weight)
     return np.column_stack([end - 0.5 * weight, end, 0.5 + 0.5 * node])
+
+
+@lru_cache(8)
+def tables_of_parts(most: int) -> Floats:
+    """(most + 1, most, 3) the :func:`corner_parts` of every count up to ``most``: row n has n of them, then zeros. It is
+    shared: nothing writes into it.
+
+    >>> tables_of_parts(2)[1].round(6).tolist()
+    [[0.0, 1.0, 0.5], [0.0, 0.0, 0.0]]
+    """
+    out = np.zeros((most + 1, most, 3))
+    for count in range(1, most + 1):
+        out[count, :count] = corner_parts(count)
+    return out
 
 
 def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tuple[NDArray[Any], ...]:

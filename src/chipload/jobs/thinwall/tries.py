@@ -60,15 +60,30 @@ class Tried:
         self.proved: list[tuple[Program, Planned, tuple[PassProgram, ...]]] = []
         self.corrections: Corrections = ()
         self.share = 1.0
+        self._written: list[tuple[Sequence[WallPass], tuple[Program, tuple[PassProgram, ...], OnMachine]]] = []
+
+    def written(self, planned: Planned) -> tuple[Program, tuple[PassProgram, ...], OnMachine]:
+        """Return the program of a plan, its passes, and it on the machine; those of the last two plans are kept, of
+        which one may be the best so far.
+        """
+        known = next((one for passes, one in self._written if passes is planned.plan.passes), None)
+        if known is None:
+            pass_programs = link_pass_programs(self.places.inputs, planned.plan, self.places.grid)
+            program = Program.join([one.program for one in pass_programs])
+            known = program, pass_programs, on_machine(self.places.inputs, program)
+            self._written = [*self._written[-1:], (planned.plan.passes, known)]
+        return known
+
+    def seconds(self, planned: Planned) -> float:
+        """Return the time of a plan on the machine."""
+        return float(self.written(planned)[2].times.sum())
 
     def prove(self, planned: Planned, share: float) -> Variant:
         """Write and simulate a plan, which takes this share of the remaining progress."""
         name, low = planned.plan.name, self.done
         width = share * (1.0 - low)
         self.variable += name == "variable"
-        pass_programs = link_pass_programs(self.places.inputs, planned.plan, self.places.grid)
-        program = Program.join([one.program for one in pass_programs])
-        run = on_machine(self.places.inputs, program)
+        program, pass_programs, run = self.written(planned)
         proof = kept_proof(
             self.keep,
             planned.plan,
@@ -211,7 +226,7 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
     raised = False
     for turn in range(TRIES):
         planned = limited_to(places.surfaces, _depth_operations(places, share, corrections, False), share * deflection)
-        if best is not None and not raised and program_seconds(places, planned) > FASTER * best.seconds:
+        if best is not None and not raised and tried.seconds(planned) > FASTER * best.seconds:
             break
         one = tried.prove(planned, 0.4)
         over, good = _overload(one, modelled, assumed)
@@ -244,7 +259,7 @@ def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dic
     if op.least_error:
         out["least_error"] = least_error(
             places, _depth_operations(places, tried.share, tried.corrections, False), constant,
-            lambda planned: program_seconds(places, planned), lambda planned: tried.prove(planned, 0.4),
+            tried.seconds, lambda planned: tried.prove(planned, 0.4),
         )  # fmt: skip
     if op.compensate_um > 0.0:
         out["compensated"] = compensate_passes(
@@ -255,12 +270,6 @@ def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dic
             lambda planned: tried.prove(planned, 0.4),
         )
     return out
-
-
-def program_seconds(places: Places, planned: Planned) -> float:
-    """Time of a plan on the machine."""
-    pass_programs = link_pass_programs(places.inputs, planned.plan, places.grid)
-    return float(on_machine(places.inputs, Program.join([one.program for one in pass_programs])).times.sum())
 
 
 def _greater(one: Corrections, other: Corrections) -> Corrections:

@@ -18,8 +18,7 @@ from chipload.planning.thinwall.passes import Plan
 from chipload.program.check import check_program
 from chipload.program.commands import Commands
 from chipload.program.program import Program
-from chipload.program.read import times_on
-from chipload.program.to_axes import to_axes
+from chipload.program.read import commands_and_times
 from chipload.program.to_work import axes_of
 
 Floats = NDArray[np.float64]
@@ -47,11 +46,11 @@ def on_machine(inputs: WallInputs, program: Program) -> OnMachine:
     """Axis positions of a program."""
     machine: Machine = inputs.cut.machine
     lengths = {o.cut.cutter.number: o.cut.cutter.overhang for o in inputs.operations}
-    commands, _ = to_axes(program, machine, tool_lengths=lengths)
+    commands, times = commands_and_times(program, machine, lengths)
     axes = axes_of(commands, machine)
     violations = [*check_program(program, machine), *limit_findings(machine, axes, commands.line, placed=False)]
     exceeding = tuple(replace(f, severity=Severity.EXCEEDS) for f in violations if f.code != "machine-offset")
-    return OnMachine(commands, times_on(program, machine, lengths), exceeding)
+    return OnMachine(commands, times, exceeding)
 
 
 def link_pass_programs(

@@ -111,7 +111,7 @@ def taken_from(
     starts, shapes, kinds = tool_parts(cutter)
     n = len(program)
     rapid, above, part = np.zeros(n), np.zeros(n), np.full(n, -1)
-    before = volume = stock.volume()
+    before = stock.volume()
     p, a = program.p_work, program.axis
     for k in range(1, n):
         if np.array_equal(p[k], p[k - 1]) and np.array_equal(a[k], a[k - 1]):
@@ -120,12 +120,11 @@ def taken_from(
             apt = (2.0 * shape[9], shape[0], shape[1], shape[2], 0.0, 0.0, shape[8])
             if j == 0 and not cutter.straight:
                 apt = (*cutter.shape.apt[:6], shape[8], *cutter.shape.outline[7:])
-            stock.remove_move(p[k - 1] + start * a[k - 1], a[k - 1], p[k] + start * a[k], a[k], apt, error_mm=0.05)
-            left = stock.volume()
-            lost, volume = volume - left, left
+            tips = p[k - 1] + start * a[k - 1], p[k] + start * a[k]
+            lost = stock.remove_move(tips[0], a[k - 1], tips[1], a[k], apt, error_mm=0.05)
             if j > 0 and lost > above[k]:
                 above[k], part[k] = lost, kinds[j]
             elif j == 0 and program.motion[k] == RAPID:
                 rapid[k] = lost
         progress(k / n, "blank")
-    return ChannelRemoval(before, volume, rapid, above, part)
+    return ChannelRemoval(before, stock.volume(), rapid, above, part)
