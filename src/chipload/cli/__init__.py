@@ -10,7 +10,12 @@ from __future__ import annotations
 import io
 import signal
 import sys
+from collections.abc import Sequence
+from copy import copy
 from typing import NoReturn
+
+from typer import Typer
+from typer.models import CommandInfo
 
 # each of these modules adds its commands to the application
 from chipload.cli import chatter as chatter
@@ -32,7 +37,14 @@ ORDER = (
     "learn-wall", "next-measurement", "watch", "mtconnect", "opcua", "tap", "chatter", "cuts", "demo", "example",
     "examples", "machines", "materials", "cutters", "view", "mcp", "export", "hal",
 )  # fmt: skip
-app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callback, "__name__", "")))
+
+
+def _name_of(command: CommandInfo) -> str:
+    """Return the word that a command is called by."""
+    return command.name or getattr(command.callback, "__name__", "")
+
+
+app.registered_commands.sort(key=lambda c: ORDER.index(_name_of(c)))
 
 
 def main() -> NoReturn:
@@ -44,11 +56,24 @@ def main() -> NoReturn:
             if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, _stop)
         _escape_foreign_characters()
-        app()
+        _application(sys.argv[1:])()
     except KeyboardInterrupt:
         # before the command began or after it ended
         sys.exit(STOPPED)
     sys.exit(0)
+
+
+def _application(words: Sequence[str]) -> Typer:
+    """Return the application without commands that are not named: their options take longer to read than a check of
+    some jobs.
+    """
+    named = [c for c in app.registered_commands if words and words[0] == _name_of(c)]
+    if not named:
+        return app
+    own = copy(app)
+    # one command alone would have no name
+    own.registered_commands = [*named, next(c for c in app.registered_commands if c is not named[0])]
+    return own
 
 
 def _escape_foreign_characters() -> None:

@@ -96,7 +96,8 @@ def _is_within(value: Any, most: float) -> bool:
 class Table(BaseModel):
     """A table of the file: unknown keys are refused, values do not change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+    # a validator is built when a table of its kind is read: a job reads few kinds
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True, defer_build=True)
 
     @field_validator("*")
     @classmethod

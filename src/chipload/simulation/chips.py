@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -128,45 +128,106 @@ def remove(
     -----
     O(n m): n steps, m earlier moves near each.
     """
-    count = count_steps(program, cutters, resolution)
-    progress(0.0, "removing")
     setting = RunSettings(cutters, material, resolution, watch, workers, loads=loads)
+    return _remove_program(
+        program, stock, setting, times, keep=keep, accuracy=accuracy, outlines=outlines, seen=seen, progress=progress
+    )[0]
+
+
+def remove_with_edge(
+    program: Program,
+    stock: LayeredStock,
+    cutters: Mapping[int, Cutter],
+    material: Material,
+    edge: Material,
+    resolution: Resolution,
+    *,
+    accuracy: bool = True,
+    progress: Progress = silent,
+) -> tuple[Removal, Removal]:
+    """Return :func:`remove` with the tooth engagement kept, and the same with the loads of another material, that of
+    the edge alone, without its accuracy: the contact is found once for both.
+    """
+    setting = RunSettings(cutters, material, resolution, None, 2, other=edge)
+    whole, other = _remove_program(
+        program, stock, setting, None, keep=True, accuracy=accuracy, outlines=True, seen=unseen, progress=progress
+    )
+    assert other is not None
+    return whole, other
+
+
+@dataclass(eq=False)
+class _Collected:
+    """What the steps of a run gave so far; ``keep``: their tooth engagement too."""
+
+    sums: RunningSums
+    keep: bool
+    columns: list[Columns] = field(default_factory=list)
+    kept: dict[int, list[Cuts]] = field(default_factory=dict)
+
+    def add(self, steps: Steps, moved: Moved, setting: RunSettings) -> Columns:
+        """Add some steps; their columns."""
+        self.sums, some, cuts = remove_block(steps, moved, self.sums, setting)
+        self.columns.append(some)
+        for engaged in cuts if self.keep else ():
+            self.kept.setdefault(engaged.tool, []).append(engaged)
+        return some
+
+    def removal(self, program: Program, stock: LayeredStock, material: Material) -> Removal:
+        """Return the removal after all steps."""
+        cut = tuple(join_cuts(self.kept[number]) for number in sorted(self.kept))
+        return removal_of(program, stock, material, self.sums, stack_blocks(self.columns), cut)
+
+
+def _remove_program(
+    program: Program,
+    stock: LayeredStock,
+    setting: RunSettings,
+    times: Floats | None,
+    *,
+    keep: bool,
+    accuracy: bool,
+    outlines: bool,
+    seen: Seen,
+    progress: Progress,
+) -> tuple[Removal, Removal | None]:
+    """:func:`remove`, and the removal with the loads of the other material of the settings, if there is one."""
+    count = count_steps(program, setting.cutters, setting.resolution)
+    progress(0.0, "removing")
     setting = with_moves(setting, program, stock)
     before = stock.copied() if accuracy else None
+    alone = None if setting.other is None else replace(setting, material=setting.other, other=None, watch=None)
     while True:
-        begun = sums = RunningSums(stock.volume(), shank=setting.asks_shank)
-        kept, columns = dict[int, list[Cuts]](), list[Columns]()
+        begun = RunningSums(stock.volume(), shank=setting.asks_shank)
+        own, others = _Collected(begun, keep), _Collected(begun, keep)
         try:
-            for sums, some, cuts in _blocks_removed(program, stock, begun, setting, times, count):
-                seen(some)
-                progress(sums.steps / count, "removing")
-                columns.append(some)
-                for engaged in cuts if keep else ():
-                    kept.setdefault(engaged.tool, []).append(engaged)
+            for steps, moved in _moved_blocks(program, stock, setting, times, count):
+                seen(own.add(steps, moved, setting))
+                if alone is not None and moved.other is not None:
+                    others.add(steps, moved.other, alone)
+                progress(own.sums.steps / count, "removing")
             break
         except MaterialAboveFlutes:
             setting = with_moves(setting, program, stock, shank=True)
     progress(1.0, "removed")
-    cut = tuple(join_cuts(kept[number]) for number in sorted(kept))
     if outlines:
         setting.run.finish(stock, setting.workers)
-    removal = removal_of(program, stock, material, sums, stack_blocks(columns), cut)
+    removal = own.removal(program, stock, setting.material)
+    other = None if alone is None else others.removal(program, stock, alone.material)
     if not outlines:
         chips = float(removal.columns["chip_volume_mm3"].sum())
         removal = replace(removal, volume_after=removal.volume_before - chips)
-    return with_accuracy(removal, program, before, setting)
+    return with_accuracy(removal, program, before, setting), other
 
 
-def _blocks_removed(
-    program: Program, stock: LayeredStock, sums: RunningSums, setting: RunSettings, times: Floats | None, count: int
-) -> Iterator[tuple[RunningSums, Columns, list[Cuts]]]:
-    """Yield the result of :func:`remove_block` for one block of the ``count`` steps after another."""
+def _moved_blocks(
+    program: Program, stock: LayeredStock, setting: RunSettings, times: Floats | None, count: int
+) -> Iterator[tuple[Steps, Moved]]:
+    """Yield one block of the ``count`` steps after another with its removal."""
     fine, size = setting.resolution, block_of(setting)
     blocks = steps_in_blocks(program, fine.step_mm, fine.tolerance, size=size, times=times)
     runs = runs_of_threads(program, stock, setting, count)
-    for steps, moved in remove_in_strips(blocks, setting, runs, sums.steps):
-        sums, some, cuts = remove_block(steps, moved, sums, setting)
-        yield sums, some, cuts
+    yield from remove_in_strips(blocks, setting, runs, 0)
 
 
 def block_of(setting: RunSettings) -> int:

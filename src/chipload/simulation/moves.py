@@ -95,6 +95,7 @@ class Moved:
     bands : (n,) each, columns of :data:`chipload.simulation.loads.BANDS`; none where the material has no band
     basis : (4, 6) integral over the time in cut of the factors of the coefficients
     cuts : tooth engagement, one for each cutter
+    other : the same with the loads of a further material; None: there is none
     """
 
     removed: Floats
@@ -102,6 +103,7 @@ class Moved:
     bands: Mapping[str, Floats]
     basis: Floats
     cuts: list[Cuts]
+    other: Moved | None = None
 
 
 @dataclass(frozen=True, eq=False)

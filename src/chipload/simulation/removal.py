@@ -161,7 +161,8 @@ def removal_between(whole: Removal, first: int, end: int) -> Removal:
 @dataclass(frozen=True, eq=False)
 class RunSettings:
     """What a run keeps to, step after step: see :func:`chipload.simulation.chips.remove`; ``moves`` the run of the
-    program, None before it is made; ``workers`` threads; ``loads`` False: the loads are 0.
+    program, None before it is made; ``workers`` threads; ``loads`` False: the loads are 0; ``other``: a further
+    material, whose loads of the same contact are calculated too.
     """
 
     cutters: Mapping[int, Cutter]
@@ -171,6 +172,7 @@ class RunSettings:
     workers: int
     moves: MoveRun | None = None
     loads: bool = True
+    other: Material | None = None
 
     @property
     def run(self) -> MoveRun:

@@ -11,8 +11,10 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any
 
+from chipload.cutting.material import Material
 from chipload.engagement.moves.stock import Engaged
 from chipload.processes import cores
 from chipload.simulation.moves import Moved, MoveRun, remove_by_moves, with_contact
@@ -64,9 +66,15 @@ def remove_in_strips(
     """
 
     def calculate(run: MoveRun, steps: Steps, number: int, found: Engaged | None = None) -> Moved:
-        return remove_by_moves(
-            steps, run, number, setting.cutters, setting.material, setting.resolution.rotation, found, setting.loads
-        )
+        found = run.contact(steps) if found is None else found
+
+        def loads_in(material: Material) -> Moved:
+            return remove_by_moves(
+                steps, run, number, setting.cutters, material, setting.resolution.rotation, found, setting.loads
+            )
+
+        moved = loads_in(setting.material)
+        return moved if setting.other is None else replace(moved, other=loads_in(setting.other))
 
     if len(runs) > 1:
         yield from _shared_blocks(blocks, runs, calculate, first)

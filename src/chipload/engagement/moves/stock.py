@@ -72,7 +72,7 @@ def corner_parts(count: int) -> Floats:
 
 @lru_cache(8)
 def tables_of_parts(most: int) -> Floats:
-    """(most + 1, most, 3) the :func:`corner_parts` of every count up to ``most``: row n has n of them, then zeros. It is
+    """(most + 1, most, 3) :func:`corner_parts` of every count up to ``most``: row n has n of them, then zeros. It is
     shared: nothing writes into it.
 
     >>> tables_of_parts(2)[1].round(6).tolist()

@@ -33,7 +33,7 @@ from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, read_program
 from chipload.program.setup import Setup
 from chipload.progress import Progress, silent
-from chipload.simulation.chips import remove
+from chipload.simulation.chips import remove_with_edge
 from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
 from chipload.stock.rings import Boss, ring_stock
@@ -322,19 +322,8 @@ def cut(
     require_linear(material)
     fine = resolution_in_stock(job, program)
     edge = edge_material(material)
-    less = remove(
-        program, stock.copied(), job.cutters, edge, fine, keep=True, accuracy=False,
-        progress=lambda x, what: progress(0.5 * x, what),
-    )  # fmt: skip
-    removal = remove(
-        program,
-        stock,
-        job.cutters,
-        material,
-        fine,
-        keep=True,
-        accuracy=accuracy,
-        progress=lambda x, what: progress(0.5 + 0.5 * x, what),
+    removal, less = remove_with_edge(
+        program, stock, job.cutters, material, edge, fine, accuracy=accuracy, progress=progress
     )
     c, own, little = removal.columns, feed_rows(removal), LITTLE_MPA / material.Ktc
     points = step_points(removal, program)

@@ -55,7 +55,7 @@ from chipload.jobs.torque.tables import SurpriseTable
 from chipload.machine.machine import Machine
 from chipload.program.program import Program
 from chipload.progress import Progress, part_of, silent
-from chipload.simulation.chips import remove
+from chipload.simulation.chips import remove_with_edge
 from chipload.simulation.deflection import contacts, step_deflections, tip_deflections
 from chipload.simulation.removal import Removal
 from chipload.stock.layers import LayeredStock
@@ -166,13 +166,9 @@ def workpiece_cut(
     )
     if known.strained is None:
         raise InputError("stock: the program cuts nothing from the workpiece: check its corners and the work offset")
-    less, removal = (
-        remove(
-            program, body, job.cutters, metal, fine, keep=True, accuracy=metal is material,
-            progress=part_of(progress, share, share + 0.25),
-        )
-        for body, metal, share in ((stock.copied(), edge_material(material), 0.5), (stock, material, 0.75))
-    )  # fmt: skip
+    removal, less = remove_with_edge(
+        program, stock, job.cutters, material, edge_material(material), fine, progress=part_of(progress, 0.5, 1.0)
+    )
     little, rows = LITTLE_MPA / material.Ktc, feed_rows(removal)
     c, light = removal.columns, less.columns
     bars = {number: tool_bars(cutter) for number, cutter in job.cutters.items()}
