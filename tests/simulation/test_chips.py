@@ -14,7 +14,7 @@ from chipload.cutting.material import Material, material_named
 from chipload.errors import InputError
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.chips import remove
+from chipload.simulation.chips import remove, remove_with_edge
 from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 from engagement.tooth_paths import loads
@@ -69,6 +69,20 @@ def test_a_slot_takes_its_volume_and_costs_what_the_closed_form_says() -> None:
         assert c[name][full] == pytest.approx(value, rel=1e-3), name
     assert c["power_w"][full] == pytest.approx(c["torque_mean_nm"][full] * 300.0, rel=1e-6)
     assert c["chip_max_mm"][full] == pytest.approx(f, rel=5e-4)
+
+
+def test_loads_with_the_material_and_with_its_edge_alone_are_those_of_the_true_paths() -> None:
+    alloy = material_named("al7075-t6")
+    edge = replace(alloy, Ktc=10.0, Krc=0.0, Kac=0.0, spread=None, covariance=None)
+    program = straight([-10, 0, -3], [30, 0, -3])
+    both = remove_with_edge(program, block(), {1: MILL}, alloy, edge, FINE, accuracy=False)
+    for removal, material in zip(both, (alloy, edge), strict=True):
+        c, f = removal.columns, math.tau * 20.0 / (4 * 300.0)
+        force, torque = means_of_a_slot(4, 3.0, f, material.coefficients)
+        full = c["x_mm"] > 6.5
+        assert c["torque_mean_nm"][full] == pytest.approx(torque / 1000.0, rel=1e-3)
+        assert c["force_y_mean_n"][full] == pytest.approx(force[1], rel=1e-3)
+        assert [cuts.tool for cuts in removal.cuts] == [1]
 
 
 @pytest.mark.parametrize("spindle", ["cw", "ccw"])

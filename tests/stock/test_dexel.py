@@ -70,10 +70,12 @@ def test_a_ray_is_in_the_cutter_where_its_profile_says(name: str) -> None:
 
 def test_a_slot_of_a_flat_mill() -> None:
     stock = TriDexel.block((0.0, 0.0, 0.0), (40.0, 20.0, 10.0), 0.2)
-    stock.remove_move((10.0, 10.0, 6.0), UP, (30.0, 10.0, 6.0), UP, FLAT.apt, error_mm=1e-5)
-    exact = 8000.0 - 4.0 * (math.pi * 25.0 + 20.0 * 10.0)
+    taken = stock.remove_move((10.0, 10.0, 6.0), UP, (30.0, 10.0, 6.0), UP, FLAT.apt, error_mm=1e-5)
+    slot = 4.0 * (math.pi * 25.0 + 20.0 * 10.0)
+    assert taken == pytest.approx(8000.0 - stock.volume(), rel=1e-9)
     for volume in stock.volume_by_direction().values():
-        assert volume == pytest.approx(exact, rel=4e-4)
+        assert volume == pytest.approx(8000.0 - slot, rel=4e-4)
+    assert stock.remove_move((10.0, 10.0, 6.0), UP, (30.0, 10.0, 6.0), UP, FLAT.apt, error_mm=1e-5) == 0.0
 
 
 def test_a_ball_plunges() -> None:

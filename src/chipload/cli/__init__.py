@@ -41,7 +41,7 @@ ORDER = (
 
 def _name_of(command: CommandInfo) -> str:
     """Return the word that a command is called by."""
-    return command.name or getattr(command.callback, "__name__", "")
+    return str(command.name or getattr(command.callback, "__name__", ""))
 
 
 app.registered_commands.sort(key=lambda c: ORDER.index(_name_of(c)))

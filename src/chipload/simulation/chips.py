@@ -149,11 +149,10 @@ def remove_with_edge(
     the edge alone, without its accuracy: the contact is found once for both.
     """
     setting = RunSettings(cutters, material, resolution, None, 2, other=edge)
-    whole, other = _remove_program(
+    whole, of_edge = _remove_program(
         program, stock, setting, None, keep=True, accuracy=accuracy, outlines=True, seen=unseen, progress=progress
     )
-    assert other is not None
-    return whole, other
+    return whole, of_edge
 
 
 @dataclass(eq=False)
@@ -190,20 +189,20 @@ def _remove_program(
     outlines: bool,
     seen: Seen,
     progress: Progress,
-) -> tuple[Removal, Removal | None]:
+) -> tuple[Removal, ...]:
     """:func:`remove`, and the removal with the loads of the other material of the settings, if there is one."""
     count = count_steps(program, setting.cutters, setting.resolution)
     progress(0.0, "removing")
     setting = with_moves(setting, program, stock)
     before = stock.copied() if accuracy else None
-    alone = None if setting.other is None else replace(setting, material=setting.other, other=None, watch=None)
+    alone = replace(setting, material=setting.other or setting.material, other=None, watch=None)
     while True:
         begun = RunningSums(stock.volume(), shank=setting.asks_shank)
         own, others = _Collected(begun, keep), _Collected(begun, keep)
         try:
             for steps, moved in _moved_blocks(program, stock, setting, times, count):
                 seen(own.add(steps, moved, setting))
-                if alone is not None and moved.other is not None:
+                if moved.other is not None:
                     others.add(steps, moved.other, alone)
                 progress(own.sums.steps / count, "removing")
             break
@@ -213,11 +212,11 @@ def _remove_program(
     if outlines:
         setting.run.finish(stock, setting.workers)
     removal = own.removal(program, stock, setting.material)
-    other = None if alone is None else others.removal(program, stock, alone.material)
+    further = () if setting.other is None else (others.removal(program, stock, alone.material),)
     if not outlines:
         chips = float(removal.columns["chip_volume_mm3"].sum())
         removal = replace(removal, volume_after=removal.volume_before - chips)
-    return with_accuracy(removal, program, before, setting), other
+    return with_accuracy(removal, program, before, setting), *further
 
 
 def _moved_blocks(
