@@ -1,6 +1,7 @@
 """The 3D view in a real browser: stock at the slider, what touches, what is drawn, measured and saved."""
 
 import base64
+import re
 
 import numpy as np
 import pytest
@@ -38,6 +39,24 @@ def stage(page, pixels):
     """The picture of the view alone."""
     data = page.evaluate(f"{VIEW}.picture()")
     return pixels(base64.b64decode(data.split(",", 1)[1]))
+
+
+def pixel(page, place):
+    """Where a place of the work is on the screen, as the view itself projects it."""
+    return page.evaluate(
+        f"""(place) => {{ const v = {VIEW}, b = v.overlay.stage.getBoundingClientRect();
+        const q = v.camera.position.clone().set(...place).project(v.camera);
+        return [b.x + (q.x + 1) * b.width / 2, b.y + (1 - q.y) * b.height / 2]; }}""",
+        place,
+    )
+
+
+def said_of(page, place):
+    """What the view says after a click on a place; it says nothing before."""
+    page.evaluate(f"{VIEW}.overlay.message('')")
+    page.mouse.click(*pixel(page, place))
+    page.wait_for_function("document.querySelector('.cv-note').textContent != ''")
+    return page.inner_text(".cv-note").split(" \u00b7 ")
 
 
 def test_the_first_view_is_the_worst_finding_with_what_touches_in_red(cut, pixels) -> None:
@@ -138,20 +157,76 @@ def test_a_length_is_measured_on_the_stock(cut) -> None:
     page.evaluate(f"{VIEW}.look('top'); {VIEW}.layer('path', false); {VIEW}.layer('cutter', false); {VIEW}.picture()")
     page.locator("button", has_text="measure").click()
     page.wait_for_function("document.querySelector('.cv-note').textContent == 'click two places'")
-    # two corners of the box, by the places that the view itself projects them to
-    places = page.evaluate(
-        f"""() => {{ const v = {VIEW}, b = v.overlay.stage.getBoundingClientRect();
-        return [[-9, -9, 0], [49, -9, 0]].map(p => {{
-          const q = v.camera.position.clone().set(...p).project(v.camera);
-          return [b.x + (q.x + 1) * b.width / 2, b.y + (1 - q.y) * b.height / 2]; }}); }}"""
-    )
+    places = [pixel(page, place) for place in ([8, 20, 0], [32, 20, 0])]
     for x, y in places:
         page.mouse.click(x, y)
     page.wait_for_function("document.querySelector('.cv-note').textContent.includes('mm')")
     said = page.inner_text(".cv-note")
-    assert float(said.split()[0]) == pytest.approx(58.0, rel=0.03)
+    assert float(said.split()[0]) == pytest.approx(24.0, rel=0.03)
+    assert said.endswith("face to face")
+    # near corners and edges of the clamp, a box of 10 x 14 x 24 mm: they are caught, so the lengths are exact
+    for first, second, length, caught in (
+        ([46.4, 2.4, 24], [55.6, 2.4, 24], "10 mm dX 10 dY 0 dZ 0", "corner to corner"),
+        ([46.4, 15.6, 24], [55.6, 2.4, 24], "17.2 mm dX 10 dY -14 dZ 0", "corner to corner"),
+        ([46.4, 15.6, 24], [55.6, 9, 24], None, "corner to edge"),
+    ):
+        page.mouse.click(*pixel(page, first))
+        page.wait_for_function("document.querySelector('.cv-note').textContent.startsWith('corner: ')")
+        page.mouse.click(*pixel(page, second))
+        page.wait_for_function("document.querySelector('.cv-note').textContent.includes('mm')")
+        said = " ".join(page.inner_text(".cv-note").split())
+        assert said.endswith(caught)
+        if length is None:
+            across, along = (float(said.split(f" d{axis} ")[1].split()[0]) for axis in "XY")
+            assert across == 10.0
+            assert along == pytest.approx(-7.0, abs=0.3)
+        else:
+            assert said.startswith(length)
     page.locator("button", has_text="measure").click()
     page.evaluate(f"{VIEW}.layer('path', true); {VIEW}.layer('cutter', true)")
+
+
+def test_a_face_says_which_line_cut_it_and_the_page_goes_there(cut) -> None:
+    """The floor beside the fourth side, which goes from (0, 40) to (0, 0), and faces that no step cut."""
+    page = cut
+    page.keyboard.press("End")
+    settle(page, ROWS - 1)
+    page.evaluate(f"{VIEW}.look('top'); {VIEW}.picture()")
+    row = int(np.argmin(np.hypot(X - 0.0, Y - 20.0)))
+    said = said_of(page, [-3.0, 20.0, -2.0])
+    # a row of the fourth side whose cutter, 4 mm wide on each side, reaches the place
+    cut_in = int(said[0].removeprefix("cut in step ")) - 1
+    assert abs(cut_in - row) <= 3
+    assert said[1:3] == ["line 10", "T1"]
+    assert float(said[3].removesuffix(" s")) == pytest.approx(T[cut_in], rel=1e-3)
+    assert said[4].startswith("force ")
+    settle(page, cut_in)
+    page.wait_for_function("document.querySelector('.cl-now')?.dataset.line == '10'")
+    page.keyboard.press("End")
+    settle(page, ROWS - 1)
+    # a click on the path says as much
+    assert said_of(page, [20.0, 0.0, -2.0])[:3] == ["step 25", "line 7", "T1"]
+    assert said_of(page, [20.0, 20.0, 0.0]) == ["this face is not cut: raw stock"]
+    assert said_of(page, [51.0, 9.0, 24.0]) == ["fixture 0: is not cut"]
+    # the front of the block hides the path, which is not clicked through it
+    page.evaluate(f"{VIEW}.look('front'); {VIEW}.picture()")
+    assert said_of(page, [10.0, -10.0, -2.5]) == ["this face is not cut: raw stock"]
+
+
+def test_a_map_says_its_value_and_the_step_next_to_it(cut) -> None:
+    """The sheet has 0.4 N m for each mm along x; the second side goes along x = 40, no step comes to its middle."""
+    page = cut
+    page.evaluate(f"{VIEW}.layer('fixture 0', false); {VIEW}.map('sheet'); {VIEW}.look('top'); {VIEW}.picture()")
+    assert said_of(page, [20.0, 20.0, 0.0])[0] == "no step comes near this face"
+    said = said_of(page, [37.5, 20.0, 0.0])
+    assert said[0].startswith("next to step ")
+    assert said[1] == "line 8"
+    assert float(re.search(r"torque (\S+) N m", said[-1])[1]) == pytest.approx(0.4 * 37.5, abs=0.1)
+    # where the surface bends the place is that of the surface that does not
+    page.evaluate(f"{VIEW}.map('sheet', 1); {VIEW}.look('top'); {VIEW}.picture()")
+    bent = said_of(page, [37.5, 20.0, 0.0])
+    assert float(re.search(r"torque (\S+) N m", bent[-1])[1]) == pytest.approx(0.4 * 37.5, abs=0.1)
+    page.evaluate(f"{VIEW}.map(''); {VIEW}.layer('fixture 0', true)")
 
 
 def test_values_under_the_pointer_and_a_saved_picture(cut) -> None:

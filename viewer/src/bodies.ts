@@ -83,9 +83,12 @@ export class Solid {
 /** A cutter of parts turned about its axis, its tip in the origin and its axis +z. */
 export class Tool {
   readonly group = new THREE.Group();
+  /** greatest radius of what cuts [mm] */
+  readonly radius: number;
   private readonly parts = new Map<string, THREE.MeshStandardMaterial[]>();
 
   constructor(parts: CutterPart[]) {
+    this.radius = Math.max(0, ...parts.filter((part) => part.kind === "flutes").flatMap((part) => part.profile.map(([r]) => r)));
     for (const part of parts) {
       const geometry = new THREE.LatheGeometry(part.profile.map(([r, z]) => new THREE.Vector2(r, z)), 48);
       geometry.rotateX(Math.PI / 2);

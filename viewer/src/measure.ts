@@ -2,12 +2,13 @@
 
 import * as THREE from "three";
 import { number } from "./overlay";
+import { Snap } from "./snap";
 
 const BLUE = 0x1b4fd0;
 
 export class Measure {
   readonly group = new THREE.Group();
-  private picks: THREE.Vector3[] | null = null;
+  private picks: Snap[] | null = null;
 
   get on(): boolean { return this.picks !== null; }
 
@@ -20,20 +21,23 @@ export class Measure {
     this.group.clear();
   }
 
-  /** A place as a ball of a radius; the length once there are two, else "". A third begins anew. */
-  add(place: THREE.Vector3, radius: number): string {
+  /** A place as a ball of a radius; what is said: its own place, or the length once there are two. A third begins anew. */
+  add(picked: Snap, radius: number): string {
     if (!this.picks) return "";
     if (this.picks.length === 2) this.begin(true);
-    this.picks.push(place);
+    this.picks.push(picked);
+    const { place, on } = picked;
     const ball = new THREE.Mesh(new THREE.SphereGeometry(radius, 12, 8), new THREE.MeshBasicMaterial({ color: BLUE, depthTest: false }));
     ball.position.copy(place);
     ball.renderOrder = 9;
     this.group.add(ball);
-    if (this.picks.length < 2) return "";
-    const [a, b] = this.picks, d = b.clone().sub(a);
+    if (this.picks.length < 2) {
+      return `${on}: X ${number(place.x)}  Y ${number(place.y)}  Z ${number(place.z)}   click the second place`;
+    }
+    const [a, b] = this.picks.map((pick) => pick.place), d = b.clone().sub(a);
     const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints([a, b]), new THREE.LineBasicMaterial({ color: BLUE, depthTest: false }));
     line.renderOrder = 9;
     this.group.add(line);
-    return `${number(d.length())} mm   dX ${number(d.x)}  dY ${number(d.y)}  dZ ${number(d.z)}`;
+    return `${number(d.length())} mm   dX ${number(d.x)}  dY ${number(d.y)}  dZ ${number(d.z)}   ${this.picks[0].on} to ${on}`;
   }
 }

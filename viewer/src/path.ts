@@ -78,8 +78,8 @@ export class ToolPath {
     return Math.min(a, a - 1 + Math.max(0, (value - column[a - 1]) / (column[a] - column[a - 1])));
   }
 
-  /** Place, among the kept rows from one row to another, at which the tool's axis is nearest to a point. */
-  nearest(point: THREE.Vector3, first: number, last: number): number {
+  /** Place, among the kept rows from one row to another, at which the tool's axis is nearest to a point, and how near. */
+  nearest(point: THREE.Vector3, first: number, last: number): [number, number] {
     const tip = new THREE.Vector3(), axis = new THREE.Vector3();
     let best = this.place(first), closest = Infinity;
     for (let k = best; k <= this.place(last); k++) {
@@ -87,7 +87,7 @@ export class ToolPath {
       const far = from.addScaledVector(axis, -along).length();
       if (far < closest) { closest = far; best = k; }
     }
-    return best;
+    return [best, closest];
   }
 
   tip(place: number, out: THREE.Vector3): THREE.Vector3 {

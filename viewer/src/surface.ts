@@ -65,6 +65,13 @@ export class MapBody {
     for (const [put, flat, moved] of this.places) if (moved?.length) put(flat.map((x, k) => x + factor * moved[k]));
   }
 
+  /** Place on the surface that does not bend, where the surface as it is drawn was hit; in coordinates of the world. */
+  unbent(hit: THREE.Intersection): THREE.Vector3 {
+    const flat = this.places[0][1], share = hit.barycoord!.toArray(), out = new THREE.Vector3();
+    [hit.face!.a, hit.face!.b, hit.face!.c].forEach((k, n) => out.addScaledVector(new THREE.Vector3().fromArray(flat, 3 * k), share[n]));
+    return this.mesh.localToWorld(out);
+  }
+
   legend(): MapLegend {
     const { label, unit, high, limit } = this.map, hex = (v: number) => "#" + this.colour(v).map((x) => x.toString(16).padStart(2, "0")).join("");
     // next to the greatest value it is nothing

@@ -14,10 +14,16 @@ import { Abscissa, Pair, between } from "./pair";
 import { ToolPath, coloured } from "./path";
 import { RING, Ring } from "./ring";
 import { recorded, saved } from "./save";
+import { snapped } from "./snap";
 import { Stock } from "./stock";
 import { MapBody } from "./surface";
+import { valueAt } from "./surface_value";
 
-const BACKGROUND = 0xeef1f5, DARK = 0x1b2128, NEAR = 14;
+const BACKGROUND = 0xeef1f5, DARK = 0x1b2128;
+/** pixels within which the path is shown by the pointer, and within which it is clicked before a face behind it */
+const NEAR = 14, GRAB = 5;
+/** of the size of what is shown: how far a map may lie from the face that is clicked, and the path from what hides it */
+const ALONG = 0.01;
 /** the scale on a dark ground: as bright at its end, and seen at its beginning */
 const DARK_SCALE: [number, string][] = [[0, "#7d6fd6"], [0.25, "#4f97d8"], [0.5, "#22c29a"], [0.75, "#9bd93c"], [1, "#fbb61a"]];
 /** distance of the camera, and half the height of a picture of a mark, in sizes of what is shown */
@@ -310,7 +316,7 @@ export class View {
   /** Measure between clicks, or stop. */
   measuring(on: boolean): void {
     this.measure.begin(on);
-    this.overlay.message(this.measure.wanted);
+    this.overlay.message(this.measure.wanted, true);
     this.dirty = true;
   }
 
@@ -427,7 +433,7 @@ export class View {
     const k = Math.floor(place), now = row ?? this.path.rows[k];
     if (now !== this.row) this.touch(null);
     this.row = now;
-    const number = this.path.tool[k], own = this.tools.get(number) ?? this.tools.get(0);
+    const own = this.toolAt(k);
     for (const tool of this.tools.values()) tool.group.visible = tool === own && !this.hidden.has("cutter");
     if (own) {
       this.path.tip(place, own.group.position);
@@ -453,7 +459,7 @@ export class View {
   private touch(mark: Mark | null): void {
     for (const s of this.solids) s.hit(mark !== null && mark.bodies.includes(s.body.name));
     for (const t of this.tools.values()) t.hit(mark && mark.kind === "collision" ? mark.bodies[0] : "");
-    this.overlay.message(mark ? mark.text : this.measure.wanted, mark?.kind === "critical");
+    this.overlay.message(mark ? mark.text : this.measure.wanted, !mark || mark.kind === "critical");
     this.dirty = true;
   }
 
@@ -496,7 +502,7 @@ export class View {
     }
     Object.assign(this.camera, { top: this.half, bottom: -this.half, left: -this.half * w / h, right: this.half * w / h });
     this.camera.updateProjectionMatrix();
-    const pixel = 2 * this.half / this.camera.zoom / h;
+    const pixel = this.pixel();
     for (const ring of this.marks.children) ring.scale.setScalar(RING * pixel);
     this.renderer.setViewport(0, 0, w, h);
     this.renderer.render(this.scene, this.camera);
@@ -505,10 +511,13 @@ export class View {
     this.overlay.ruler(pixel);
   }
 
+  /** Size of a pixel [mm]. */
+  private pixel(): number { return 2 * this.half / this.camera.zoom / this.overlay.stage.clientHeight; }
+
   /** Drawn point of the path within some pixels of the pointer, the nearest to the camera. */
-  private near(x: number, y: number): number {
+  private near(x: number, y: number, within = NEAR): number {
     const w = this.overlay.stage.clientWidth, h = this.overlay.stage.clientHeight, v = new THREE.Vector3();
-    let best = -1, closest = NEAR * NEAR;
+    let best = -1, closest = within * within;
     const p = this.path.drawn;
     for (let k = 0; k < p.length / 3; k++) {
       v.set(p[3 * k], p[3 * k + 1], p[3 * k + 2]).applyMatrix4(this.work.matrixWorld).project(this.camera);
@@ -539,42 +548,69 @@ export class View {
       if (side) { this.lookFrom(side); this.follow(); return; }
     }
     if (this.measure.on) { this.pick(x, y); return; }
-    const k = this.hidden.has("path") ? -1 : this.near(x, y);
-    if (k >= 0) this.tellRow(this.path.drawnRows[k], "clicked");
-    else this.ask(x, y);
+    const hit = this.hit(x, y), k = this.hidden.has("path") ? -1 : this.near(x, y, hit ? GRAB : NEAR);
+    if (k >= 0 && !(hit && this.behind(k, hit.point))) {
+      const row = this.path.drawnRows[k], place = this.path.place(row);
+      this.goAndSay(row, `step ${row + 1}`, place, this.path.tip(place, new THREE.Vector3()));
+    } else if (hit) this.ask(hit);
   }
 
-  /** Say which step cut the face of the stock at a pixel, and go there. */
-  private ask(x: number, y: number): void {
-    const hit = this.stock?.group.visible ? this.hit(x, y) : undefined;
-    if (!this.stock || hit?.object !== this.stock.mesh) return;
-    const rows = this.stock.cutBy(hit.faceIndex!);
+  /** Whether a place hides a drawn point of the path. */
+  private behind(k: number, place: THREE.Vector3): boolean {
+    const point = this.work.localToWorld(new THREE.Vector3().fromArray(this.path.drawn, 3 * k));
+    return point.sub(place).dot(this.camera.getWorldDirection(new THREE.Vector3())) > ALONG * this.size();
+  }
+
+  /** Say which step cut the face that was hit, and go there. */
+  private ask(hit: THREE.Intersection): void {
+    const solid = this.solids.find((s) => s.mesh === hit.object);
+    if (solid?.body.kind === "fixture") { this.overlay.message(`${solid.body.name}: is not cut`, true); return; }
+    const own = hit.object === this.stock?.mesh, rows = own ? this.stock!.cutBy(hit.faceIndex!) : [0, this.path.count - 1] as [number, number];
     if (!rows) { this.overlay.message("this face is not cut: raw stock", true); return; }
-    const place = this.path.nearest(this.work.worldToLocal(hit.point), ...rows), row = this.path.rows[place];
+    const at = this.work.worldToLocal(hit.object === this.shownMap?.mesh ? this.shownMap.unbent(hit) : hit.point.clone());
+    const [place, far] = this.path.nearest(at, ...rows), row = this.path.rows[place], radius = this.toolAt(place)?.radius ?? 0;
+    if (own) this.goAndSay(row, `cut in step ${row + 1}`, place, at);
+    else if (far <= 1.05 * radius + ALONG * this.size()) this.goAndSay(row, `next to step ${row + 1}`, place, at);
+    else this.overlay.message(["no step comes near this face", ...this.valuesAt(at)].join(" \u00b7 "), true);
+  }
+
+  /** Go to a row, and say its line, tool, time and load, and the values of the surface maps at a place. */
+  private goAndSay(row: number, begin: string, place: number, at: THREE.Vector3): void {
     this.go(row);
-    const c = this.colouring, v = this.path.values, said = [`cut in step ${row + 1}`];
+    const c = this.colouring, v = this.path.values, said = [begin];
     if (this.path.line) said.push(`line ${this.path.line[place]}`);
     if (this.path.tool[place]) said.push(`T${this.path.tool[place]}`);
     said.push(`${number(this.path.t[place])} s`);
     let d = 0;
     while (d < this.path.drawnRows.length - 1 && this.path.drawnRows[d] < row) d++;
     if (c && v) said.push(c.words.length ? c.words[v[d]]?.[0] ?? "" : `${c.label} ${number(v[d])} ${c.unit}`);
-    this.overlay.message(said.join(" \u00b7 "), true);
+    this.overlay.message([...said, ...this.valuesAt(at)].join(" \u00b7 "), true);
     this.tellRow(row, "clicked");
   }
 
-  /** What is drawn at a pixel, of bodies and stock. */
+  /** Values of the surface maps at a place, as words. */
+  private valuesAt(at: THREE.Vector3): string[] {
+    return (this.doc.header.maps ?? []).flatMap((map) => {
+      const value = valueAt(this.doc, map, at, ALONG * this.size());
+      return value === null ? [] : [`${map.label} ${number(value)} ${map.unit}`];
+    });
+  }
+
+  private toolAt(place: number): Tool | undefined { return this.tools.get(this.path.tool[place]) ?? this.tools.get(0); }
+
+  /** What is drawn at a pixel, of bodies, stock and map. */
   private hit(x: number, y: number): THREE.Intersection | undefined {
     const ray = new THREE.Raycaster();
     ray.setFromCamera(new THREE.Vector2(2 * x / this.overlay.stage.clientWidth - 1, 1 - 2 * y / this.overlay.stage.clientHeight), this.camera);
     return this.first(ray.ray);
   }
 
-  /** What a ray meets first, of bodies and stock as they are shown. */
+  /** What a ray meets first, of bodies, stock and map as they are shown. */
   private first(along: THREE.Ray): THREE.Intersection | undefined {
     const ray = new THREE.Raycaster(along.origin, along.direction);
     const meshes = this.solids.filter((s) => s.group.visible).map((s) => s.mesh as THREE.Object3D);
     if (this.stock?.group.visible) meshes.push(this.stock.mesh);
+    if (this.shownMap) meshes.push(this.shownMap.mesh);
     const hits = ray.intersectObjects(meshes, false).filter((i) =>
       (i.object !== this.stock?.mesh || this.stock.shows(i.faceIndex!)) && (!this.plane || this.plane.distanceToPoint(i.point) >= 0));
     // where a part ends in the plane of the stock the stock is what is seen
@@ -585,8 +621,10 @@ export class View {
   private pick(x: number, y: number): void {
     const hit = this.hit(x, y);
     if (!hit) return;
-    const said = this.measure.add(this.work.worldToLocal(hit.point), this.size() * 0.005);
-    if (said) this.overlay.message(said);
+    const mesh = hit.object as THREE.Mesh, shows = (face: number) => mesh !== this.stock?.mesh || this.stock.shows(face);
+    const caught = snapped(mesh, this.work.worldToLocal(hit.point.clone()), this.pixel(), shows);
+    const said = this.measure.add(caught, this.size() * 0.005);
+    if (said) this.overlay.message(said, true);
     this.dirty = true;
   }
 }
