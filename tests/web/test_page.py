@@ -241,3 +241,38 @@ def test_names_and_texts_of_a_result_are_only_shown(window) -> None:
     assert "<script>" in page.inner_text(".cl-message")
     assert page.evaluate("document.querySelectorAll('.cl-page img, .cl-page svg[onload]').length") == 0
     assert "This result has no scene" in page.inner_text(".cl-notice")
+
+
+def test_a_print_of_a_dark_page_is_light_with_whole_plots(square, pixels) -> None:
+    page = square
+    ground = f"(({VIEW}).scene.background.getHexString())"
+    light = page.evaluate(ground)
+    page.keyboard.press("d")
+    page.wait_for_function(f"{ground} != '{light}'")
+    plot = page.locator(".cl-figure .main-svg").first
+    size = [0.0, 0.0, *(float(plot.get_attribute(name)) for name in ("width", "height"))]
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert [float(x) for x in plot.get_attribute("viewBox").split()] == pytest.approx(size, abs=1e-3)
+    assert page.evaluate(ground) == light
+    # the picture on paper is one that a printer takes: as large as the view, and mostly of its light ground
+    paper = page.locator(".cl-stage canvas").nth(1)
+    assert paper.evaluate("c => [c.width, c.height]") == page.locator(".cl-stage canvas").nth(0).evaluate(
+        "c => [c.width, c.height]"
+    )
+    share = paper.evaluate(
+        "c => { const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+        " let n = 0; for (let k = 0; k < d.length; k += 4) n += d[k] > 200 ? 1 : 0; return 4 * n / d.length; }"
+    )
+    assert share > 0.4
+    page.emulate_media(media="print")
+    panel = page.locator(".cl-panel").first
+    assert panel.evaluate("e => getComputedStyle(e).backgroundColor") == "rgb(255, 255, 255)"
+    # scaled by its box, not cut off
+    assert plot.bounding_box()["width"] <= page.locator(".cl-figure").bounding_box()["width"] + 1.0
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.emulate_media(media="screen")
+    assert plot.get_attribute("viewBox") is None
+    assert page.evaluate(ground) != light
+    assert page.locator(".cl-stage canvas").count() == 1
+    page.keyboard.press("d")
+    page.wait_for_function(f"{ground} == '{light}'")

@@ -6,6 +6,7 @@ import { Abscissa } from "./pair";
 import { View } from "./view";
 
 export { ownKeys } from "./keys";
+export { printsPlots } from "./print";
 export { send } from "./send";
 
 const views = new Map<string, View>(), cuts = new Map<string, CutPanel>();

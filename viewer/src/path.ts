@@ -9,6 +9,8 @@ import { Colouring, Document, Header, Path as PathRecord, Rgb } from "./document
 export const ABOVE: Rgb = [200, 30, 30];
 const NONE: Rgb = [150, 156, 165];
 const WIDTH = 2.2, THICK = 5;
+/** of more segments the lines are one pixel wide: they lie next to one another, and cost a twentieth without a GPU */
+const MANY = 8000;
 
 export function rgb(hex: string): Rgb {
   return [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16)) as Rgb;
@@ -35,6 +37,15 @@ export function coloured(values: Float32Array, above: Uint8Array | null, c: Colo
   });
 }
 
+/** Lines one pixel wide between pairs of places, in the colours of their ends. */
+function thin(place: number[], colour: number[]): { lines: THREE.LineSegments; material: THREE.Material } {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(place, 3));
+  geometry.setAttribute("color", new THREE.Float32BufferAttribute(colour, 3));
+  const material = new THREE.LineBasicMaterial({ vertexColors: true, toneMapped: false });
+  return { lines: new THREE.LineSegments(geometry, material), material };
+}
+
 export class ToolPath {
   readonly group = new THREE.Group();
   readonly rows: Uint32Array;
@@ -48,7 +59,7 @@ export class ToolPath {
   values: Float32Array | null = null;
   private readonly axes: Float32Array | null;
   private readonly apart: Uint8Array;
-  private readonly sets: { lines: LineSegments2; material: LineMaterial }[] = [];
+  private readonly sets: { lines: LineSegments2 | THREE.LineSegments; material: THREE.Material }[] = [];
 
   constructor(doc: Document, private readonly path: PathRecord) {
     this.rows = doc.u4(path.rows);
@@ -122,15 +133,15 @@ export class ToolPath {
         colour.push(linear.r, linear.g, linear.b, linear.r, linear.g, linear.b);
       }
       if (!place.length) continue;
+      if (!thick && place.length > 6 * MANY) { this.sets.push(thin(place, colour)); continue; }
       const geometry = new LineSegmentsGeometry();
       geometry.setPositions(place);
       geometry.setColors(colour);
       const material = new LineMaterial({ linewidth: thick ? THICK : WIDTH, vertexColors: true, toneMapped: false });
       const lines = new LineSegments2(geometry, material);
-      lines.renderOrder = 3;
       this.sets.push({ lines, material });
-      this.group.add(lines);
     }
+    for (const { lines } of this.sets) { lines.renderOrder = 3; this.group.add(lines); }
   }
 
   clip(planes: THREE.Plane[]): void {

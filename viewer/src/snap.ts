@@ -11,18 +11,18 @@ const MOST = 800;
 
 export interface Snap { place: THREE.Vector3; on: "corner" | "edge" | "face" }
 
-/** Triangles of a mesh whose box comes within a distance of a place, where `shows` tells that they are drawn. */
-function around(mesh: THREE.Mesh, place: THREE.Vector3, reach: number, shows: (face: number) => boolean): THREE.Triangle[] {
+/** Triangles of a mesh that are drawn, and whose box comes within a distance of a place. */
+function around(mesh: THREE.Mesh, place: THREE.Vector3, reach: number): THREE.Triangle[] {
   const p = mesh.geometry.getAttribute("position"), index = mesh.geometry.getIndex()!, at = place.toArray(), out: THREE.Triangle[] = [];
   const values = p.array as Float32Array;
-  for (let f = 0; f < index.count; f += 3) {
+  for (let f = 0; f < Math.min(index.count, mesh.geometry.drawRange.count); f += 3) {
     const a = 3 * index.getX(f), b = 3 * index.getX(f + 1), c = 3 * index.getX(f + 2);
     let near = true;
     for (let i = 0; i < 3 && near; i++) {
       const u = values[a + i], v = values[b + i], w = values[c + i];
       near = Math.min(u, v, w) <= at[i] + reach && Math.max(u, v, w) >= at[i] - reach;
     }
-    if (!near || !shows(f / 3)) continue;
+    if (!near) continue;
     const one = new THREE.Triangle(...[a, b, c].map((k) => new THREE.Vector3().fromArray(values, k)) as [THREE.Vector3, THREE.Vector3, THREE.Vector3]);
     if (one.getArea() > 0) out.push(one);
   }
@@ -51,9 +51,9 @@ function creases(faces: THREE.Triangle[], place: THREE.Vector3, reach: number, p
 }
 
 /** What is caught at a place on a mesh: a corner before an edge, an edge before the face; `pixel` is its size [mm]. */
-export function snapped(mesh: THREE.Mesh, place: THREE.Vector3, pixel: number, shows: (face: number) => boolean): Snap {
-  let reach = CORNER * pixel, faces = around(mesh, place, reach, shows);
-  for (; faces.length > MOST && reach > pixel; reach /= 2) faces = around(mesh, place, reach / 2, shows);
+export function snapped(mesh: THREE.Mesh, place: THREE.Vector3, pixel: number): Snap {
+  let reach = CORNER * pixel, faces = around(mesh, place, reach);
+  for (; faces.length > MOST && reach > pixel; reach /= 2) faces = around(mesh, place, reach / 2);
   if (faces.length > MOST) return { place, on: "face" };
   const found = creases(faces, place, reach, pixel), same = 1e-2 * pixel;
   let corner: THREE.Vector3 | null = null, closest = reach;

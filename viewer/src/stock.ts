@@ -1,9 +1,11 @@
-/** The stock at any frame: all quads at once, each drawn in the frames in which it is seen; nothing is sent again. */
+/** The stock at any frame: all quads are there at once, those that are seen in the frame are drawn. */
 
 import * as THREE from "three";
 import { Document, Removal, Rgb } from "./document";
 
 const RAW = new THREE.Color(0xb98a4e), CUT = new THREE.Color(0x9fadbd), CAP = new THREE.Color(0x8d6a3b);
+/** the last frame of a quad that stays, and the corners of the two triangles of a quad */
+const NEVER = 65535, CORNERS = [0, 1, 2, 0, 2, 3];
 
 /** Corners (q, 4, 3) from vertices and quads, which are held column by column as differences from the row before. */
 function unrolled(doc: Document, removal: Removal): Uint16Array {
@@ -26,9 +28,11 @@ export class Stock {
   readonly rows: Uint32Array;
   frame = -1;
   private readonly seen: Uint16Array;
+  /** quads that are drawn, in the order of the index */
+  private readonly drawn: Uint32Array;
   private readonly low: THREE.Vector3;
   private readonly uniforms = {
-    frame: { value: 0 }, raw: { value: RAW }, cap: { value: CAP }, shades: { value: null as THREE.Texture | null },
+    raw: { value: RAW }, cap: { value: CAP }, shades: { value: null as THREE.Texture | null },
     size: { value: 1 }, glass: { value: 0 }, cut: { value: 0 },
   };
 
@@ -39,18 +43,14 @@ export class Stock {
     this.low = new THREE.Vector3(...removal.low);
     const count = this.seen.length / 2;
     const scale = removal.low.map((a, i) => (removal.high[i] - a) / 65535);
-    const position = new Float32Array(count * 12), seen = new Float32Array(count * 8);
-    const index = new Uint32Array(count * 6);
+    const position = new Float32Array(count * 12), birth = new Float32Array(count * 4);
+    this.drawn = new Uint32Array(count);
     for (let k = 0; k < corners.length; k++) position[k] = removal.low[k % 3] + corners[k] * scale[k % 3];
-    for (let q = 0; q < count; q++) {
-      const last = this.seen[2 * q + 1] === 65535 ? 1e9 : this.seen[2 * q + 1];
-      for (let n = 0; n < 4; n++) { seen[8 * q + 2 * n] = this.seen[2 * q]; seen[8 * q + 2 * n + 1] = last; }
-      index.set([4 * q, 4 * q + 1, 4 * q + 2, 4 * q, 4 * q + 2, 4 * q + 3], 6 * q);
-    }
+    for (let q = 0; q < count; q++) birth.fill(this.seen[2 * q], 4 * q, 4 * q + 4);
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
-    geometry.setAttribute("seen", new THREE.BufferAttribute(seen, 2));
-    geometry.setIndex(new THREE.BufferAttribute(index, 1));
+    geometry.setAttribute("birth", new THREE.BufferAttribute(birth, 1));
+    geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(count * 6), 1).setUsage(THREE.DynamicDrawUsage));
     geometry.computeBoundingSphere();
     const material = new THREE.MeshStandardMaterial({
       roughness: 0.75, metalness: 0.0, flatShading: true, side: THREE.DoubleSide,
@@ -69,8 +69,24 @@ export class Stock {
     while (a < b) { const m = (a + b) >> 1; if (this.rows[m] <= row) a = m + 1; else b = m; }
     const changed = a !== this.frame;
     this.frame = a;
-    this.uniforms.frame.value = a;
+    if (changed) this.choose();
     return changed;
+  }
+
+  /** Put the quads of the frame into the index: a twentieth of all, as a rule. */
+  private choose(): void {
+    const { geometry } = this.mesh, index = geometry.getIndex()!, to = index.array as Uint32Array, count = this.seen.length / 2;
+    let n = 0;
+    for (let q = 0; q < count; q++) {
+      const last = this.seen[2 * q + 1];
+      if (this.seen[2 * q] > this.frame || (this.frame >= last && last !== NEVER)) continue;
+      for (let k = 0; k < 6; k++) to[6 * n + k] = 4 * q + CORNERS[k];
+      this.drawn[n++] = q;
+    }
+    geometry.setDrawRange(0, 6 * n);
+    index.clearUpdateRanges();
+    index.addUpdateRange(0, 6 * n);
+    index.needsUpdate = true;
   }
 
   /** Colours of what was cut in each frame; null: one colour for all that was cut. */
@@ -95,15 +111,9 @@ export class Stock {
     material.needsUpdate = true;
   }
 
-  /** Whether a triangle that a ray has met is drawn now. */
-  shows(face: number): boolean {
-    const q = face >> 1;
-    return this.seen[2 * q] <= this.frame && (this.frame < this.seen[2 * q + 1] || this.seen[2 * q + 1] === 65535);
-  }
-
   /** First and last row in which the face of a triangle was made; null: it is a face of the raw stock. */
   cutBy(face: number): [number, number] | null {
-    const frame = this.seen[2 * (face >> 1)];
+    const frame = this.seen[2 * this.drawn[face >> 1]];
     return frame === 0 ? null : [frame > 1 ? this.rows[frame - 2] + 1 : 0, this.rows[frame - 1]];
   }
 
@@ -118,8 +128,7 @@ export class Stock {
     const p = this.mesh.geometry.getAttribute("position"), i = this.mesh.geometry.getIndex()!;
     const a = new THREE.Vector3(), b = new THREE.Vector3(), c = new THREE.Vector3();
     let six = 0, triangles = 0;
-    for (let f = 0; f < i.count / 3; f++) {
-      if (!this.shows(f)) continue;
+    for (let f = 0; f < this.mesh.geometry.drawRange.count / 3; f++) {
       [a, b, c].forEach((v, n) => v.fromBufferAttribute(p, i.getX(3 * f + n)).sub(this.low));
       six += a.dot(b.cross(c));
       triangles++;
@@ -130,10 +139,8 @@ export class Stock {
   private dress(shader: THREE.WebGLProgramParametersWithUniforms): void {
     Object.assign(shader.uniforms, this.uniforms);
     shader.vertexShader = shader.vertexShader
-      .replace("#include <common>", "#include <common>\nattribute vec2 seen; uniform float frame; varying float born;")
-      .replace("#include <project_vertex>", `#include <project_vertex>
-        born = seen.x;
-        if (frame < seen.x || frame >= seen.y) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);`);
+      .replace("#include <common>", "#include <common>\nattribute float birth; varying float born;")
+      .replace("#include <project_vertex>", "#include <project_vertex>\nborn = birth;");
     shader.fragmentShader = shader.fragmentShader
       .replace("#include <common>", `#include <common>
         uniform vec3 raw; uniform vec3 cap; uniform sampler2D shades; uniform float size; uniform float glass; uniform float cut;

@@ -13,6 +13,7 @@ import { Overlay, number } from "./overlay";
 import { Abscissa, Pair, between } from "./pair";
 import { ToolPath, coloured } from "./path";
 import { RING, Ring } from "./ring";
+import { darkNow, onPrint } from "./print";
 import { recorded, saved } from "./save";
 import { snapped } from "./snap";
 import { Stock } from "./stock";
@@ -70,6 +71,7 @@ export class View {
   private uncut: THREE.Plane | null = null;
   private upright = false;
   private dirty = true;
+  private paper: HTMLCanvasElement | null = null;
   private draped = false;
   private shades: Rgb[] | null = null;
   private place = 0;
@@ -112,6 +114,7 @@ export class View {
       if (Math.hypot(e.clientX - down[0], e.clientY - down[1]) < 5) this.click(e);
     });
     new MutationObserver(() => { this.dirty = true; this.relight(); }).observe(document.body, { attributeFilter: ["class"] });
+    onPrint((now) => { this.relight(); this.draw(); this.onPaper(now); });
     new ResizeObserver(() => { this.dirty = true; }).observe(this.overlay.stage);
     const loop = (now: number) => {
       if (!host.isConnected) { this.renderer.dispose(); return; }
@@ -169,7 +172,7 @@ export class View {
 
   /** The ground and the scale are those of a dark page or of a light one. */
   private relight(): void {
-    const dark = document.body.classList.contains("body--dark");
+    const dark = darkNow();
     (this.scene.background as THREE.Color).set(dark ? DARK : BACKGROUND);
     if (!this.header) return;
     this.lightScale ??= this.header.scale;
@@ -177,6 +180,18 @@ export class View {
     this.colour(this.painted, this.colouring);
     const map = this.shownMap;
     if (map) { const share = map.most > 0 ? map.factor / map.most : 0; this.map(""); this.map(map.map.name + (map.banded ? BANDED : ""), share); }
+  }
+
+  /** A printer takes the picture of a canvas that is drawn in two dimensions, not the one that is just being drawn. */
+  private onPaper(now: boolean): void {
+    this.paper?.remove();
+    this.paper = null;
+    if (!now) return;
+    const shown = this.renderer.domElement, paper = document.createElement("canvas");
+    Object.assign(paper, { width: shown.width, height: shown.height });
+    paper.getContext("2d")!.drawImage(shown, 0, 0);
+    shown.after(paper);
+    this.paper = paper;
   }
 
   private legend(): void {
@@ -588,9 +603,10 @@ export class View {
     this.tellRow(row, "clicked");
   }
 
-  /** Values of the surface maps at a place, as words. */
+  /** Values at a place of the map that is shown, else of those of a deviation, as words. */
   private valuesAt(at: THREE.Vector3): string[] {
-    return (this.doc.header.maps ?? []).flatMap((map) => {
+    const maps = this.shownMap ? [this.shownMap.map] : (this.doc.header.maps ?? []).filter((map) => map.tolerance);
+    return maps.flatMap((map) => {
       const value = valueAt(this.doc, map, at, ALONG * this.size());
       return value === null ? [] : [`${map.label} ${number(value)} ${map.unit}`];
     });
@@ -611,8 +627,7 @@ export class View {
     const meshes = this.solids.filter((s) => s.group.visible).map((s) => s.mesh as THREE.Object3D);
     if (this.stock?.group.visible) meshes.push(this.stock.mesh);
     if (this.shownMap) meshes.push(this.shownMap.mesh);
-    const hits = ray.intersectObjects(meshes, false).filter((i) =>
-      (i.object !== this.stock?.mesh || this.stock.shows(i.faceIndex!)) && (!this.plane || this.plane.distanceToPoint(i.point) >= 0));
+    const hits = ray.intersectObjects(meshes, false).filter((i) => !this.plane || this.plane.distanceToPoint(i.point) >= 0);
     // where a part ends in the plane of the stock the stock is what is seen
     const same = hits.find((i) => i.object === this.stock?.mesh && i.distance - hits[0].distance < 1e-3 * this.size());
     return same ?? hits[0];
@@ -621,8 +636,7 @@ export class View {
   private pick(x: number, y: number): void {
     const hit = this.hit(x, y);
     if (!hit) return;
-    const mesh = hit.object as THREE.Mesh, shows = (face: number) => mesh !== this.stock?.mesh || this.stock.shows(face);
-    const caught = snapped(mesh, this.work.worldToLocal(hit.point.clone()), this.pixel(), shows);
+    const caught = snapped(hit.object as THREE.Mesh, this.work.worldToLocal(hit.point.clone()), this.pixel());
     const said = this.measure.add(caught, this.size() * 0.005);
     if (said) this.overlay.message(said, true);
     this.dirty = true;

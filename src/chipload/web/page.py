@@ -82,7 +82,7 @@ class Page:
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
         ui.add_head_html(
             '<script>document.documentElement.lang = "en"</script><script src="/viewer.js"></script>'
-            "<script>chiploadViewer.ownKeys()</script>"
+            "<script>chiploadViewer.ownKeys(); chiploadViewer.printsPlots()</script>"
         )
         ui.colors(primary="#2f5d8a")
         self.dark = ui.dark_mode(None)
