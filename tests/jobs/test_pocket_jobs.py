@@ -13,6 +13,7 @@ import shapely
 from chipload.errors import InputError
 from chipload.jobs import load_job
 from chipload.jobs.contour.run import _resolve_operation, read_inputs
+from chipload.jobs.contour.scene import blanks_of
 from pocket_job import SMALL, SQUARE, checked, done, operation, swept, written
 
 #: the limits are used up by the nominal loads
@@ -34,6 +35,9 @@ def test_levels_at_an_engagement_that_is_stated(tmp_path):
     assert two.summary["lifts"] == 2 * (one.summary["lifts"] + 1) - 1
     assert outcome.operations[0].depth == 7.0
     assert (np.diff(two.history["t_s"]) >= -1e-9).all()
+    # it is drawn in a block that has a floor below the pocket
+    (blank,) = blanks_of(outcome).values()
+    assert blank.mesh.bounds[:, 2].tolist() == pytest.approx([-7.0 - 3.5, 0.0])
 
 
 def test_a_part_that_stands_in_the_stock(tmp_path):

@@ -19,6 +19,9 @@ from chipload.report.shape import merge_meshes, ribbon, slab, stretches
 
 Floats = NDArray[np.float64]
 
+#: the blank of a pocket is drawn thicker than the pocket is deep by this share of its depth: no job states how thick
+FLOOR = 0.5
+
 
 def scene_bytes(outcome: ContourResult) -> bytes:
     """The file scene.glb."""
@@ -30,7 +33,9 @@ def scene_bytes(outcome: ContourResult) -> bytes:
 
 
 def blanks_of(outcome: ContourResult) -> dict[str, Blank]:
-    """Initial blank of each strategy: the prism over its stock, or, where it begins in the solid, over a box."""
+    """Initial blank of each strategy: the prism over its stock, or, where it begins in the solid, over a box, which is
+    thicker than a pocket is deep.
+    """
     out = {}
     for k, op in enumerate(outcome.operations):
         for name, strategy in op.result.strategies.items():
@@ -41,7 +46,9 @@ def blanks_of(outcome: ContourResult) -> dict[str, Blank]:
             else:
                 rows = np.column_stack([strategy.history[x] for x in ("x_mm", "y_mm")])
                 low, high = rows.min(axis=0) - 2.0 * op.cutter.radius, rows.max(axis=0) + 2.0 * op.cutter.radius
-                mesh = trimesh.creation.box(bounds=[[*low, op.top - op.depth], [*high, op.top]])
+                has_floor = op.settings.get("kind") == "pocket" and "tabs" not in op.settings
+                bottom = op.top - op.depth * (1.0 + FLOOR if has_floor else 1.0)
+                mesh = trimesh.creation.box(bounds=[[*low, bottom], [*high, op.top]])
             if mesh.is_watertight:
                 out[track_name(outcome, k, name)] = Blank(mesh, {op.cutter.number: op.cutter})
     return out
