@@ -118,6 +118,13 @@ def test_another_user_of_this_computer_is_refused(served, cookie) -> None:
     assert " 403 " in handshake(served, f"http://127.0.0.1:{served.port}", cookie=given)
 
 
+def test_no_answer_is_compressed(served) -> None:
+    """It stays on this computer; the time to compress a picture of a long history is longer than to make it."""
+    status, headers, body = ask(served, "/viewer.js", Accept_Encoding="gzip")
+    assert (status, "content-encoding" in headers) == (200, False)
+    assert len(body) == int(headers["content-length"]) > 100_000
+
+
 def test_each_page_has_a_token_of_its_own(served, tmp_path) -> None:
     make_result(tmp_path / "r")
     other = Served(tmp_path / "r")

@@ -7,14 +7,13 @@ from pathlib import Path
 import pytest
 
 from chipload.errors import InputError
-
-page = pytest.importorskip("chipload.web.page", reason="no nicegui: the page is not tested")
+from chipload.web.folder_access import target_in
 
 
 @pytest.mark.parametrize("name", ["a" * 300, "a" * 5000])
 def test_a_name_that_is_too_long(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError) as err:
-        page.target_in(tmp_path.resolve(), name)
+        target_in(tmp_path.resolve(), name)
     assert str(err.value) == f"{name[:40]}: cannot be written: File name too long: name another folder"
 
 
@@ -23,5 +22,5 @@ def test_a_link_out_of_the_opened_folder(tmp_path: Path) -> None:
     root.mkdir()
     (root / "away").symlink_to(tmp_path)
     with pytest.raises(InputError, match=r"^away/new: must be the name of a folder in the opened one$"):
-        page.target_in(root, "away/new")
-    assert page.target_in(root, " new ") == root / "new"
+        target_in(root, "away/new")
+    assert target_in(root, " new ") == root / "new"

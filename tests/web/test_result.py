@@ -28,8 +28,7 @@ from chipload.web import plots, scene
 from chipload.web.asset_cache import CAPACITY, AssetCache
 from chipload.web.checks import bound_of, findings, limits, row_of
 from chipload.web.cutters import UNKNOWN, cutters_of
-from chipload.web.folder_access import find_by_hash, list_folder, open_path, resolve_name
-from chipload.web.page import target_in
+from chipload.web.folder_access import find_by_hash, list_folder, open_path, resolve_name, target_in
 from chipload.web.panels.limits import finding_list, limit_table, time_line
 from chipload.web.result import TextColumn, open_result
 from chipload.web.source import follow_lines, source_of

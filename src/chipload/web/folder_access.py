@@ -113,6 +113,27 @@ def is_job(file: Path) -> bool:
     return any(isinstance(raw.get(key), (dict, list)) for key in (c.key for c in CAPABILITIES))
 
 
+def target_in(root: Path, out: str) -> Path:
+    """The folder of a result that a person names, in the opened folder.
+
+    Raises
+    ------
+    InputError
+        It is not in the opened folder, or the folder itself.
+    """
+    part = PurePosixPath(out.strip())
+    if not out.strip() or part.is_absolute() or ".." in part.parts or "\\" in out or "\0" in out:
+        raise InputError(f"{out}: must be the name of a folder in the opened one")
+    target = root / part
+    try:
+        above = next(p for p in (target, *target.parents) if p.exists())
+    except OSError as err:
+        raise InputError(f"{out[:40]}: cannot be written: {err.strerror}: name another folder") from None
+    if not above.resolve().is_relative_to(root) or target == root:
+        raise InputError(f"{out}: must be the name of a folder in the opened one")
+    return target
+
+
 def list_folder(root: Path) -> tuple[list[FolderEntry], bool]:
     """Results and jobs in the folder, by name, and whether no more than :data:`ENTRIES` files were there to look at."""
     out: list[FolderEntry] = []

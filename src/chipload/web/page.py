@@ -1,4 +1,4 @@
-"""The page: shows the folder, runs and stops jobs, shows a result, handles the keyboard."""
+"""The page: shows the folder, a job or a result, and handles the keyboard."""
 
 from __future__ import annotations
 
@@ -7,38 +7,33 @@ import contextlib
 from collections.abc import Sequence
 from html import escape
 from importlib import resources
-from pathlib import PurePosixPath
 from typing import Any
 from urllib.parse import quote
 
-from nicegui import background_tasks, ui
+from nicegui import ui
 
-from chipload.errors import InputError, OutputError
+from chipload.errors import InputError
 from chipload.report.answer import STYLE as ANSWER_STYLE
-from chipload.report.folder import check_target
 from chipload.result import Result, Verdict
-from chipload.result.changes import Change
 from chipload.web.asset_cache import AssetCache
 from chipload.web.comparison import MOST
-from chipload.web.dropped import DroppedProgram, write_answers
 from chipload.web.folder_access import (
     ENTRIES,
     FolderEntry,
     OpenedFolder,
-    is_job,
-    is_result,
     list_folder,
     resolve_name,
 )
 from chipload.web.home import home_groups
 from chipload.web.panels import RELEASE
-from chipload.web.panels.dropped import DropZone, Questions
+from chipload.web.panels.dropped import DropZone
 from chipload.web.panels.home import HomePanel, list_unread
 from chipload.web.panels.job_form import JobForm
+from chipload.web.panels.run import RunPanel
 from chipload.web.panels.shape import ShapePanel
 from chipload.web.result import NoMotionError, PageResult, open_result
 from chipload.web.result_view import VERDICTS, ResultView
-from chipload.web.runs import JobRun
+from chipload.web.runs import Runs
 
 KEYS = (
     ("\u2190 \u2192", "one step back or forward; with Shift twenty"),
@@ -54,30 +49,14 @@ KEYS = (
     ("d", "dark or light"),
     ("?", "this list"),
 )
-#: seconds between two looks at a run
-LOOK = 0.25
-
-
-class Runs:
-    """The runs of this page: one at a time, seen in every window."""
-
-    def __init__(self) -> None:
-        self.now: JobRun | None = None
-
-    async def stop(self) -> None:
-        """Stop what runs."""
-        if self.now is not None:
-            await self.now.stop()
 
 
 class Page:
     """One window."""
 
     def __init__(self, opened: OpenedFolder, runs: Runs, assets: AssetCache) -> None:
-        self.opened, self.runs, self.assets = opened, runs, assets
+        self.opened, self.assets = opened, assets
         self.result: PageResult | None = None
-        self.own: JobRun | None = None
-        self.seen: JobRun | None = runs.now if runs.now is not None and runs.now.ended else None
         ui.add_css(ANSWER_STYLE)
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
         ui.add_head_html(
@@ -88,19 +67,20 @@ class Page:
         self.dark = ui.dark_mode(None)
         with ui.element("div").classes("cl-page"):
             self._header()
-            self._bar()
+            self.run = RunPanel(
+                opened, runs, self._folder_name, self.show, self._home,
+                lambda name: self.others.set_value([f"result {name}"]),
+            )  # fmt: skip
             self.home = ui.element("div").classes("cl-home")
             with ui.element("div").classes("cl-view") as self.stage:
                 self.view = ResultView(assets)
             self.shape = ShapePanel()
         self.view.moved_on = self._moved_on
-        self.view.can_run = lambda: self._job_of_result() is not None
-        self.view.run_change = self._try_change
+        self.view.can_run = lambda: self.run.job_of(self.result) is not None
+        self.view.run_change = lambda change: self.run.try_change(self.result, change)
         self.opening, self.list = self._dialog("Open")
-        self.running, self.ask = self._dialog("Before the run")
         self._help()
         ui.keyboard(on_key=self._key, ignore=["input", "textarea"])
-        ui.timer(LOOK, self._poll)
         self.stage.set_visibility(False)
 
     async def begin(self, name: str | None) -> None:
@@ -199,22 +179,6 @@ class Page:
         with contextlib.suppress(TimeoutError):
             self.dark.set_value(not await ui.run_javascript("document.body.classList.contains('body--dark')"))
 
-    def _bar(self) -> None:
-        """Where a run is."""
-        with ui.element("div").classes("cl-run").mark("run") as self.bar:
-            self.bar_text = ui.label("").classes("cl-run-text").props("role=status").mark("run-text")
-            self.bar_line = (
-                ui.linear_progress(0.0, show_value=False, size="8px")
-                .classes("cl-run-line")
-                .props('aria-label="progress of the run"')
-            )
-            self.bar_stop = ui.button("Stop", on_click=self.runs.stop).props("outline dense no-caps color=red")
-            self.bar_stop.mark("stop")
-            self.bar_close = ui.button(icon="close", on_click=lambda: self.bar.set_visibility(False)).props(
-                "flat dense round size=sm aria-label=close"
-            )
-        self.bar.set_visibility(False)
-
     def _dialog(self, title: str) -> tuple[Any, Any]:
         with ui.dialog().props(f'aria-label="{title}"') as dialog, ui.card().classes("cl-dialog"):
             ui.label(title).classes("cl-dialog-title").props("role=heading aria-level=2")
@@ -266,7 +230,7 @@ class Page:
                     with ui.element("div").classes("cl-scroll cl-job"):
                         JobForm(resolve_name(self.opened.root, job), lambda values: self._request_folder(job, values))
                     ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job").props("tabindex=0")
-            DropZone(self._ask_questions, lambda text: ui.notify(text, type="negative"))
+            DropZone(self.run.ask_questions, lambda text: ui.notify(text, type="negative"))
             ui.label("Results and jobs in this folder").classes("cl-dialog-title").props("role=heading aria-level=2")
             _list_notes(found, all_seen)
             HomePanel(groups, self._folder_name, self.show, self._job, self._request_folder)
@@ -300,151 +264,17 @@ class Page:
         self.opening.close()
         await self._home(name)
 
+    def _request_folder(self, job: str, overrides: Sequence[str] = ()) -> None:
+        """Ask where the result of a job goes, and run it."""
+        self.opening.close()
+        self.run.ask_folder(job, overrides)
+
     def _folder_name(self, name: str) -> str:
         return self.opened.root.name if name == "." else name
 
     def _text(self, job: str) -> str:
         lines = resolve_name(self.opened.root, job).read_text("utf-8", "replace").splitlines()
         return "".join(f'<div class="cl-line"><i>{k}</i>{escape(t) or " "}</div>' for k, t in enumerate(lines, 1))
-
-    # -- running ------------------------------------------------------------------------------------------------
-    def _request_folder(self, job: str, overrides: Sequence[str] = ()) -> None:
-        """Where the result goes; one with changed values goes next to the last one and is compared with it."""
-        self.opening.close()
-        stem, folder = PurePosixPath(job).stem, PurePosixPath(job).parent
-        last = (folder / ("result" if stem == "job" else f"result-{stem}")).as_posix()
-        known = is_result(self.opened.root / last)
-        out = f"{last}-changed" if overrides else last
-        self.ask.clear()
-        with self.ask:
-            ui.label(f"{self._folder_name(job)}: folder for the result, in the opened folder:").classes("cl-note")
-            where = ui.input(value=out).props("dense outlined").classes("cl-out").mark("out")
-            for text in overrides:
-                ui.label(text).classes("cl-note cl-changed")
-            message = ui.label("").classes("cl-no")
-            compared = last if overrides and known else None
-            with ui.element("div").classes("cl-entry"):
-                _button(
-                    "Run", lambda: self._run(job, str(where.value), message, overrides, compared), "play_arrow"
-                ).props("unelevated color=primary").props(remove="flat").mark("start")
-                _button("Cancel", self.running.close)
-        self.running.open()
-
-    def _ask_questions(self, program: DroppedProgram) -> None:
-        """Ask what a dropped program leaves open; the answers become a job in the opened folder."""
-        self.ask.clear()
-        with self.ask:
-            questions = Questions(program)
-            ui.label("Folder of the job, in the opened folder:").classes("cl-note")
-            where = ui.input(value=program.folder).props('dense outlined aria-label="folder of the job"')
-            where.classes("cl-out").mark("out")
-            message = ui.label("").classes("cl-no")
-
-            async def write(run: bool) -> None:
-                await self._write_job(program, questions, str(where.value).strip(), message, run)
-
-            with ui.element("div").classes("cl-entry"):
-                _button("Run", lambda: write(True), "play_arrow").props("unelevated color=primary").props(
-                    remove="flat"
-                ).mark("start")
-                _button("Save the job only", lambda: write(False)).mark("save-job")
-                _button("Cancel", self.running.close)
-        self.running.open()
-
-    async def _write_job(
-        self, program: DroppedProgram, questions: Questions, folder: str, message: Any, run: bool
-    ) -> None:
-        """Write the job of a dropped program, and run it: the verdict of a coarse run comes first."""
-        try:
-            if run and self.runs.now is not None and not self.runs.now.ended:
-                raise InputError("a job is running: stop it first")
-            target = target_in(self.opened.root, folder)
-            path = await asyncio.to_thread(write_answers, program, questions.answers, target)
-        except (InputError, OutputError) as err:
-            message.set_text(str(err).replace(f"{self.opened.root}/", ""))
-            return
-        job = path.relative_to(self.opened.root).as_posix()
-        if run:
-            self._run(job, f"{folder}/result", message, (), None, draft=True)
-            await self._home()
-        else:
-            self.running.close()
-            await self._home(job)
-
-    def _run(
-        self, job: str, out: str, message: Any, overrides: Sequence[str], compared: str | None, draft: bool = False
-    ) -> None:
-        """Start a run, unless one runs or its folder cannot be written."""
-        root = self.opened.root
-        try:
-            if self.runs.now is not None and not self.runs.now.ended:
-                raise InputError("a job is running: stop it first")
-            path = resolve_name(root, job)
-            if not is_job(path):
-                raise InputError(f"{job}: is no longer a job")
-            target = target_in(root, out)
-            check_target(target)
-        except (InputError, OutputError) as err:
-            message.set_text(str(err).replace(f"--out {root}/", ""))
-            return
-        self.running.close()
-        self.runs.now = now = JobRun(job, target.relative_to(root).as_posix(), overrides, compared, draft)
-        self.seen, self.own = None, now
-        self.bar.set_visibility(True)
-        background_tasks.create(now.work(path, target))
-
-    def _job_of_result(self) -> str | None:
-        """The job of the program that is shown; None: it is not in the folder, or its feeds are not changed."""
-        if self.result is None or self.result.result.capability != "program":
-            return None
-        name = PurePosixPath(self.result.name)
-        stem = "job" if name.name == "result" else name.name.removeprefix("result-")
-        job = (name.parent / f"{stem}.toml").as_posix()
-        try:
-            return job if is_job(resolve_name(self.opened.root, job)) else None
-        except InputError:
-            return None
-
-    def _try_change(self, change: Change) -> None:
-        """Run the job with new feeds of the lines that load too much, and compare the result with the one shown."""
-        job, result = self._job_of_result(), self.result
-        if job is None or result is None:
-            return
-        slowest = min(20.0, 50.0 * change.factor)
-        overrides = [f"operation.0.feeds.{key}={value:g}" for key, value in (
-            ("slowest_percent", slowest), ("fastest_percent", 100.0),
-        )]  # fmt: skip
-        message = ui.label("").classes("cl-no")
-        self._run(job, f"{result.name}-changed", message, overrides, result.name)
-        if message.text:
-            ui.notify(message.text, type="negative")
-        message.delete()
-
-    async def _poll(self) -> None:
-        now = self.runs.now
-        if now is None or self.seen is now:
-            return
-        self.bar.set_visibility(True)
-        self.bar_line.set_value(round(now.done, 3))
-        self.bar_line.set_visibility(not now.ended)
-        self.bar_stop.set_visibility(now.state == "running")
-        self.bar_close.set_visibility(now.ended)
-        message = {
-            "running": f"{now.job}: {100.0 * now.done:.0f} % \u00b7 {now.what}"
-            + (f" \u00b7 first look, coarse: {now.first}" if now.first else ""),
-            "stopping": f"{now.job}: stopping",
-            "done": f"{now.job}: done. {now.message}",
-            "stopped": f"{now.job}: stopped, {now.message.removeprefix('stopped: ') or 'nothing was written'}",
-            "failed": f"{now.job}: {now.message}",
-        }[now.state]
-        self.bar_text.set_text(message)
-        if now.ended:
-            self.seen = now
-            if now.state == "done" and now is self.own:
-                await self.show(now.out)
-                if now.compared is not None and now.compared != now.out:
-                    self.others.set_value([f"result {now.compared}"])
-                self.bar.set_visibility(False)
 
     # -- keys ---------------------------------------------------------------------------------------------------
     async def _show_track(self) -> None:
@@ -500,7 +330,7 @@ class Page:
             await self._switch_dark()
         elif key.name == "h" and not event.action.repeat:
             await self._go_home()
-        elif self.result is None or self.help.value or self.opening.value or self.running.value:
+        elif self.result is None or self.help.value or self.opening.value or self.run.asks:
             return
         elif key.arrow_left or key.arrow_right:
             self.view.move(steps if key.arrow_right else -steps)
@@ -526,27 +356,6 @@ def _list_notes(found: list[FolderEntry], all_seen: bool) -> None:
         ui.label(f"The folder holds more than {ENTRIES} files; the others were not read.").classes("cl-note")
     if not found:
         ui.label("This folder holds no result and no job. `chipload example` copies one.").classes("cl-note")
-
-
-def target_in(root: Any, out: str) -> Any:
-    """The folder of a result that a person names, in the opened folder.
-
-    Raises
-    ------
-    InputError
-        It is not in the opened folder, or the folder itself.
-    """
-    part = PurePosixPath(out.strip())
-    if not out.strip() or part.is_absolute() or ".." in part.parts or "\\" in out or "\0" in out:
-        raise InputError(f"{out}: must be the name of a folder in the opened one")
-    target = root / part
-    try:
-        above = next(p for p in (target, *target.parents) if p.exists())
-    except OSError as err:
-        raise InputError(f"{out[:40]}: cannot be written: {err.strerror}: name another folder") from None
-    if not above.resolve().is_relative_to(root) or target == root:
-        raise InputError(f"{out}: must be the name of a folder in the opened one")
-    return target
 
 
 def _button(text: str, act: Any, icon: str | None = None, tip: str = "") -> Any:

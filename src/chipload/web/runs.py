@@ -123,3 +123,15 @@ async def _tail(stream: asyncio.StreamReader) -> str:
         kept = (kept + chunk)[-KEPT:]
     lines = kept.decode("utf-8", "replace").strip().splitlines()
     return lines[-1] if lines else ""
+
+
+class Runs:
+    """The runs of this page: one at a time, seen in every window."""
+
+    def __init__(self) -> None:
+        self.now: JobRun | None = None
+
+    async def stop(self) -> None:
+        """Stop what runs."""
+        if self.now is not None:
+            await self.now.stop()

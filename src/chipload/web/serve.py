@@ -13,11 +13,14 @@ import webbrowser
 from collections.abc import Callable, Iterator
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from chipload.errors import InputError
 from chipload.lazy import require_extra
 from chipload.web.folder_access import OpenedFolder, open_path, resolve_name
+
+if TYPE_CHECKING:
+    from chipload.web.guard import App, Receive, Scope, Send
 
 #: the only address that the server listens on, and the port that it tries first by default
 HOST, PORT = "127.0.0.1", 8170
@@ -147,8 +150,9 @@ def _application(opened: OpenedFolder, port: int, token: str, is_ending: Callabl
     from chipload.report.view import viewer_script
     from chipload.web.asset_cache import AssetCache
     from chipload.web.guard import SANDBOX, Guard
-    from chipload.web.page import Page, Runs
+    from chipload.web.page import Page
     from chipload.web.result import REPORT
+    from chipload.web.runs import Runs
     from chipload.web.thumbnail import thumbnail
 
     # what is on its way to a window that was closed is no news for the terminal
@@ -205,4 +209,17 @@ def _application(opened: OpenedFolder, port: int, token: str, is_ending: Callabl
     app.config.socket_io_js_transports = ["websocket"]
     outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     ui.run_with(outer, title="chipload", tailwind=False, show_welcome_message=False, reconnect_timeout=30.0)
-    return Guard(outer, port, token)
+    return Guard(_uncompressed(outer), port, token)
+
+
+def _uncompressed(application: App) -> App:
+    """An application that compresses no answer: they stay on this computer, and a picture of a long history would take
+    longer to compress than to make.
+    """
+
+    async def plain(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http":
+            scope = {**scope, "headers": [(k, v) for k, v in scope["headers"] if k.lower() != b"accept-encoding"]}
+        await application(scope, receive, send)
+
+    return plain
