@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import re
+import shutil
 import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
@@ -178,6 +180,34 @@ def test_a_program_that_is_dropped_is_asked_about_run_and_shown(window, folder) 
     assert summary["verdict"] == "unproven"
     page.wait_for_function("document.querySelector('.cl-word').textContent == 'unproven'")
     assert any("guess" in f["text"] for f in summary["findings"])
+
+
+def test_what_is_known_of_the_limits_is_stated_before_the_result(window, folder) -> None:
+    """It rises, at most to the nominal value of the whole verdict."""
+    growing = folder / "growing"
+    example = copy_example("chips", growing) / "job.toml"
+    (growing / "blade.toml").unlink()
+    try:
+        page = window("")
+        page.evaluate(
+            """() => { window.texts = []; const bar = document.querySelector('.cl-run-text');
+            const seen = {childList: true, subtree: true, characterData: true};
+            new MutationObserver(() => texts.push(bar.textContent)).observe(bar, seen); }"""
+        )
+        start(page, "growing/job.toml", "growing/result")
+        page.wait_for_selector(".cl-limits", state="visible", timeout=300_000)
+        found = [re.search(r"so far .*?force (\S+) of (\S+) N in line (\d+)", text) for text in page.evaluate("texts")]
+        values = [float(one[1]) for one in found if one]
+        assert values
+        assert values == sorted(values)
+        force = next(
+            x for x in json.loads((growing / "result" / "summary.json").read_text())["limits"] if x["name"] == "force_n"
+        )
+        assert {float(one[2]) for one in found if one} == {force["limit"]}
+        assert values[-1] <= force["worst"] * (1.0 + 1e-3)
+        wait(lambda: not workers(example))
+    finally:
+        shutil.rmtree(growing)
 
 
 def test_the_first_look_of_a_draft_comes_before_its_result(tmp_path) -> None:
