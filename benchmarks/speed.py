@@ -10,6 +10,7 @@ Processor seconds, so that other work on the computer counts little; memory is t
 - how much faster the kernel is on 2 and 4 threads with a core each: its processor time over that of its busiest thread
   and of the main thread, which works for all (``--threads`` alone, with ``--moves``);
 - the time of the height map that checks of the stock follow (``--heights`` alone);
+- `check` and `run` of examples that are named (``--examples plate tube`` alone; twice, so that nothing is compiled);
 - the exponent of time over the number of moves, and time and memory of a further move in a job.
 
 ``--quick``: 1,000 and 5,000 moves, about a minute of processor time; start and report are then most of a job, and only
@@ -299,6 +300,18 @@ def measured(names: Sequence[str], moves: Sequence[int], byte_code: str) -> list
     return table
 
 
+def example_rows(names: Sequence[str], byte_code: str) -> list[Row]:
+    """Processor seconds of `check` and `run` of examples, each in a process of its own."""
+    table = list[Row]()
+    for name in names:
+        job = str(Path(examples.__file__).parent / name / "job.toml")
+        for word, more in (("check", []), ("run", ["--out", str(Path(byte_code) / name), "--fresh"])):
+            # what is not compiled yet is compiled by the first
+            seconds = [command([word, job, *more], byte_code).seconds for _ in range(2)]
+            table.append(Row(f"{word} of the example {name}", math.nan, seconds[1], "s"))
+    return table
+
+
 def print_table(table: Sequence[Row]) -> None:
     """Print the rows, and how busy the computer is."""
     print("| work | goal | measured | |\n|---|---|---|---|")
@@ -317,7 +330,12 @@ def main() -> None:
     ask.add_argument("--names", nargs="+", choices=NAMES, default=NAMES, help="programs")
     ask.add_argument("--threads", action="store_true", help="only the kernel on 2 and 4 threads")
     ask.add_argument("--heights", action="store_true", help="only the height map of upright programs")
+    ask.add_argument("--examples", nargs="+", default=(), help="only check and run of these examples")
     given = ask.parse_args()
+    if given.examples:
+        with tempfile.TemporaryDirectory() as byte_code:
+            print_table(example_rows(given.examples, byte_code))
+        return
     if given.heights:
         table = list[Row]()
         for name in (name for name in given.names if name != "five axes"):
