@@ -288,7 +288,7 @@ def test_a_signal_outside_of_the_command_is_no_fault(when: str) -> None:
         "        except SystemExit:\n"
         "            pass\n"
         "    os.kill(os.getpid(), signal.SIGTERM)\n"
-        "cli.app = stopped\n"
+        "cli._application = lambda words: stopped\n"
         "cli.main()\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
