@@ -144,7 +144,7 @@ def test_an_agent_that_is_silent_and_started_again(agent: tuple[str, int]) -> No
     assert said[3] == "samples are lost: the agent was started again"
     assert [text.startswith(f"line {line}: ") for text in said[4:-1]] == [True]
     assert "missing stock" in said[4]
-    assert said[-1].endswith("1 alarms")
+    assert said[-1].endswith("; 1 alarm")
     assert call("watch", "http://127.0.0.1:9", "--job", "job.toml")[0] == 2
 
 
