@@ -263,7 +263,8 @@ def test_a_print_of_a_dark_page_is_light_with_whole_plots(square, pixels) -> Non
         "c => { const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
         " let n = 0; for (let k = 0; k < d.length; k += 4) n += d[k] > 200 ? 1 : 0; return 4 * n / d.length; }"
     )
-    assert share > 0.4
+    # a dark ground has none; how much of the picture the part fills depends on its camera
+    assert share > 0.2
     page.emulate_media(media="print")
     panel = page.locator(".cl-panel").first
     assert panel.evaluate("e => getComputedStyle(e).backgroundColor") == "rgb(255, 255, 255)"
