@@ -77,6 +77,21 @@ def levels(top: float, bottom: float, most: float, even: bool) -> list[float]:
     return [*(top - (k + 1) * step for k in range(count - 1)), bottom]
 
 
+def count_rings(room: float, step: float, tool_radius: float) -> int:
+    """Return the number of rings over ``room`` [mm] that are at most ``step`` apart and leave no ridge between them.
+
+    Raises
+    ------
+    InputError
+        There are too many.
+    """
+    width = min(step, WIDEST_STEP * tool_radius)
+    count = math.ceil(room / width - 1e-9) if width > 0.0 else MOST_RINGS + 1
+    if count > MOST_RINGS:
+        raise InputError(f"a cycle with a step of {step:g} mm: must need at most {MOST_RINGS} rings")
+    return count
+
+
 def rough(pocket: PocketCycle, allowance: float, clear: float, passes: list[float]) -> Iterator[Step]:
     """Clear a pocket up to an allowance, pass by pass, from ``clear`` above the surface, and back there.
 
@@ -92,10 +107,7 @@ def rough(pocket: PocketCycle, allowance: float, clear: float, passes: list[floa
             f"a pocket {2 * pocket.a:g} x {2 * pocket.b:g} mm: a tool of radius {pocket.tool_radius:g} mm with an "
             f"allowance of {allowance:g} mm does not fit"
         )
-    step = min(pocket.step, WIDEST_STEP * pocket.tool_radius)
-    count = math.ceil(max(inner, 0.0) / step - 1e-9) if step > 0.0 else MOST_RINGS + 1
-    if count > MOST_RINGS:
-        raise InputError(f"a pocket with a step of {pocket.step:g} mm: must need at most {MOST_RINGS} rings")
+    count = count_rings(max(inner, 0.0), pocket.step, pocket.tool_radius)
     start_z = clear
     for z in passes:
         yield from _enter(pocket, max(inner, 0.0), start_z, z)
@@ -146,10 +158,7 @@ def stud(
             f"a blank of {2 * a:g} x {2 * b:g} mm: must be at least the stud of {2 * pocket.a:g} x {2 * pocket.b:g} mm"
         )
     reach = _farthest(pocket, (a, b, min(corner, a, b))) - allowance
-    step = min(pocket.step, WIDEST_STEP * pocket.tool_radius)
-    count = max(1, math.ceil(reach / step - 1e-9)) if step > 0.0 else MOST_RINGS + 1
-    if count > MOST_RINGS:
-        raise InputError(f"a stud with a step of {pocket.step:g} mm: must need at most {MOST_RINGS} rings")
+    count = max(1, count_rings(reach, pocket.step, pocket.tool_radius))
     start = a + BESIDE_BLANK + pocket.tool_radius
     yield RAPID, start, 0.0, clear, 0.0, (0.0, 0.0), 0
     for z in passes:

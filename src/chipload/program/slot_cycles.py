@@ -14,13 +14,12 @@ Cycles, "Circumferential slot SLOT2".
 from __future__ import annotations
 
 import cmath
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from chipload.errors import InputError
 from chipload.program.commands import ARC, LINE, RAPID
-from chipload.program.pocket_cycles import MOST_RINGS, WIDEST_STEP, Step
+from chipload.program.pocket_cycles import Step, count_rings
 
 #: a slot as wide as the tool is cut along its middle line alone [mm]
 SAME_MM = 1e-6
@@ -67,10 +66,7 @@ def arc_slot_steps(
             f"a slot {slot.width:g} mm wide on a radius of {slot.radius:g} mm: a tool of radius "
             f"{slot.tool_radius:g} mm with an allowance of {allowance:g} mm does not fit"
         )
-    step = min(slot.step, WIDEST_STEP * slot.tool_radius)
-    count = math.ceil(max(room, 0.0) / step - 1e-9) if step > 0.0 else MOST_RINGS + 1
-    if count > MOST_RINGS:
-        raise InputError(f"a slot with a step of {slot.step:g} mm: must need at most {MOST_RINGS} loops")
+    count = count_rings(max(room, 0.0), slot.step, slot.tool_radius)
     begin, end = (cmath.rect(slot.radius, slot.first + a) for a in (0.0, slot.sweep))
     along, turns = slot.sweep >= 0.0, 1 if slot.sweep >= 0.0 else -1
     yield RAPID, begin.real, begin.imag, clear, 0.0, (0.0, 0.0), 0
