@@ -131,10 +131,13 @@ def test_lag_of_the_sensor_is_found():
     assert found.material.Kte == pytest.approx(0.85 * PRIOR.Kte, rel=0.03)
 
 
-def test_a_clock_that_jumps_is_named(log, program):
-    """40 s are added in the middle of a program: without its lines it is refused, and the jump is said."""
-    time = np.where(np.arange(len(log.time)) > len(log.time) // 2, log.time + 40.0, log.time)
-    with pytest.raises(InputError, match=r"another program.*its clock: 1 gap in time, the first of 40\.1 s at"):
+@pytest.mark.parametrize(("jump", "said"), [(40.0, r"40\.1 s"), (1e9, "1e9 s")])
+def test_a_clock_that_jumps_is_named(log, program, jump, said):
+    """Seconds, or those since 1970, are added in the middle of a program: without its lines it is refused, and the jump
+    is said.
+    """
+    time = np.where(np.arange(len(log.time)) > len(log.time) // 2, log.time + jump, log.time)
+    with pytest.raises(InputError, match=rf"another program.*its clock: 1 gap in time, the first of {said} at"):
         align_log("log", replace(log, time=time), log.power, program)
 
 

@@ -40,6 +40,8 @@ SAMPLES, TRIED = 4096, 71
 #: time constants of a sensor that are tried [s], then refined, and the greatest shift that is believed [s], in samples:
 #: drives filter their power and current by 0.02 to 0.1 s, and a log on its own clock has its lag found before
 SENSOR_LAGS, MOST_SHIFT_S, MOST_SHIFT_SAMPLES = (0.0, 0.03, 0.1, 0.3), 0.3, 2.0
+#: greatest time constant of a sensor that is found [s]
+MOST_LAG_S = 1.0
 #: a step of time over the usual one, and in seconds, that is a gap
 GAP_STEPS, GAP_S = 10.0, 1.0
 
@@ -306,20 +308,22 @@ def _shift_and_sensor_lag(
 ) -> tuple[Floats, float, float]:
     """Return the time of the history of each sample, how much later it is taken [s], and the lag of the sensor [s].
 
-    On equal steps of the time of a sample, at which the sensor is a recursive filter: O(m) for each of 100 trials.
+    On equal steps, at which the sensor is a recursive filter: O(m) for each of 100 trials. A gap lasts a few steps.
     """
     step = float(np.median(np.diff(time)))
-    grid = np.arange(time[0], time[-1] + step, step)
-    seen = np.interp(grid, time, signal)
+    clock = np.concatenate([[0.0], np.cumsum(np.minimum(np.diff(time), GAP_STEPS * step))])
+    grid = np.arange(0.0, clock[-1] + step, step)
+    seen = np.interp(grid, clock, signal)
     most = max(MOST_SHIFT_S, MOST_SHIFT_SAMPLES * step)
 
     def misfit(x: Floats) -> float:
         lag = stated if stated > 0.0 else abs(float(x[1]))
-        at = np.interp(grid - x[0], time, place)
+        at = np.interp(grid - x[0], clock, place)
         row = np.searchsorted(end, at, side="left")
         inside = (at >= 0.0) & (row < len(end))
         expected = np.where(inside, load[np.minimum(row, len(end) - 1)], 0.0)
-        return -_correlation(seen, first_order(expected, grid, lag)) if abs(x[0]) <= most else 1.0
+        believed = abs(x[0]) <= most and lag <= max(MOST_LAG_S, stated)
+        return -_correlation(seen, first_order(expected, grid, lag)) if believed else 1.0
 
     tried = [(shift, lag) for lag in SENSOR_LAGS for shift in np.linspace(-most, most, 13)]
     best = min(tried, key=lambda x: misfit(np.array(x)))
@@ -327,7 +331,7 @@ def _shift_and_sensor_lag(
     found = scipy.optimize.minimize(
         misfit, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-3, "maxfev": 80}
     ).x
-    return np.interp(time - found[0], time, place), float(found[0]), stated if stated > 0.0 else abs(float(found[1]))
+    return np.interp(clock - found[0], clock, place), float(found[0]), stated if stated > 0.0 else abs(float(found[1]))
 
 
 def _means_on_grid(grid: Floats, step: float, clock: Floats, signal: Floats) -> Floats:
