@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from chipload.checking.default_checks import ramp_findings, range_findings, unchecked_checks
+from chipload.checking.left_out import rest_on_left_out
 from chipload.checking.limits import program_limits
 from chipload.checking.numbers import operation_numbers, program_numbers
 from chipload.checking.outcome import ChangedText, ProgramResult, SimulationResult
@@ -50,7 +51,7 @@ def program_result(
     return Result(
         capability=capability,
         title=program.title,
-        tracks=tracks,
+        tracks=tuple(rest_on_left_out(track, program.reading.findings) for track in tracks),
         operations=({**own, **numbers, "program": program_numbers(program)},),
         findings=program.reading.findings,
         unchecked=unchecked_texts(program),

@@ -41,6 +41,7 @@ def check_program(
     setup: Setup,
 ) -> int:
     """Read a program, show its findings and a summary, and return the exit code."""
+    from chipload.program.missing_axes import MISSING_AXIS
     from chipload.program.motions import bounds, lengths
     from chipload.program.read import line_times, read_program, read_tools
     from chipload.program.time import slow_machine
@@ -48,19 +49,25 @@ def check_program(
 
     table, feed = read_tools(tools) if tools is not None else None, feed_of(feed_mm_min)
     refused: list[InputError] = []
+    best: tuple[int, ProgramReading] | None = None
     for name in GENERIC if machine is None else (machine,):
-        on = machine_of(name)
         try:
             with bar() as progress:
-                reading = read_program(
-                    path, on, dialect=dialect, tools=table, feed=feed, tolerance=tolerance_mm, setup=setup,
-                    progress=progress,
+                one = read_program(
+                    path, machine_of(name), dialect=dialect, tools=table, feed=feed, tolerance=tolerance_mm,
+                    setup=setup, progress=progress,
                 )  # fmt: skip
-            break
         except InputError as err:
             refused.append(err)
-    else:
+            continue
+        lacking = sum(f.code == MISSING_AXIS for f in one.findings)
+        if best is None or lacking < best[0]:
+            best = lacking, one
+        if not lacking:
+            break
+    if best is None:
         raise refused[0]  # that of the simplest machine
+    reading, on = best[1], best[1].machine
     if machine is None:
         show(f"no machine is stated: {on.name} is assumed; name yours with --machine, as its limits and times differ")
     if reading.recognition is not None:

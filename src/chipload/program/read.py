@@ -28,6 +28,7 @@ from chipload.program.control import CONTROLS, control_named, is_cl_data
 from chipload.program.gcode.reader import gcode_text
 from chipload.program.gcode.tools import ToolTable, read_tool_table
 from chipload.program.heidenhain.reader import heidenhain_text, read_heidenhain, tool_definitions
+from chipload.program.missing_axes import hold_missing_axes
 from chipload.program.nc_text import NcText, read_nc
 from chipload.program.program import Program
 from chipload.program.recognise import Recognition, recognise
@@ -177,8 +178,8 @@ def read_program(
     Raises
     ------
     InputError
-        The file cannot be read, what it asks for can't be carried out, the machine has not the axes that it moves, or
-        what is stated about a cutter contradicts the job's.
+        The file cannot be read, what it asks for can't be carried out, or what is stated about a cutter contradicts
+        the job's.
     """
     path, setup = Path(path), setup or Setup()
     recognition, text = control_of(path, machine, dialect, setup.control.name, text)
@@ -221,6 +222,8 @@ def read_program(
         if len(commands) == 0:
             left_out = next((f": {f}" for f in findings if f.severity >= Severity.UNPROVEN), "")
             raise InputError(f"{path.name}: no motion: nothing to check{left_out}")
+        commands, held = hold_missing_axes(commands, machine)
+        findings += held
         program, more = to_work(commands, machine, tolerance=tolerance, placed=placed)
         if machine.chain.rotary:
             findings = tuple(replace(f, severity=Severity.UNPROVEN) if f.code in OF_LENGTHS else f for f in findings)

@@ -23,7 +23,9 @@ from chipload.program.apt.reader import apt_text
 from chipload.program.control import is_cl_data
 from chipload.program.gcode.reader import gcode_text
 from chipload.program.heidenhain.din_iso import conversational
+from chipload.program.left_out import LEFT_OUT
 from chipload.program.lines_of import UNSET, reading_of_lines
+from chipload.program.missing_axes import MISSING_AXIS
 from chipload.program.motions import bounds, lengths
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ENDINGS, ProgramReading, read_program, read_tools
@@ -57,10 +59,6 @@ NO_FEED = "the feed is 0 or was never set"
 LISTED = 8
 #: ends of the codes of findings that do not concern the motions
 PLAIN = ("-unused", "-unknown", "-coolant")
-#: findings on blocks that may cut and are not in the program
-LEFT_OUT = frozenset(
-    {"nc-not-read", "nc-call", "nc-unknown-word", "nc-left-out", "heidenhain-cycle", "heidenhain-left-out"}
-)
 _LARGEST = 500_000_000
 #: the first speed of a text, outside its comments
 _SPEED = re.compile(r"(?<![A-Z_<\[])S\s*([0-9]+(?:\.[0-9]*)?)(?![0-9A-Z])", re.IGNORECASE)
@@ -205,7 +203,7 @@ def _text(path: Path, apt: bool) -> str:
 
 
 def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None) -> _Chosen:
-    """The reading with the least that is left unproven, on the first machine that has the axes."""
+    """The reading with the least that is left unproven, on the first machine that lacks the fewest axes."""
     ending = path.suffix.lower()
     size = len(known.text) if known.text is not None else path.stat().st_size if path.is_file() else 0
     groups: tuple[tuple[str | None, ...], ...] = ((None,),)
@@ -218,33 +216,28 @@ def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None)
         groups = (tuple(dict.fromkeys((named, "linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"))),)
     setup = Setup(cutters=cutters or {})
     refused: list[tuple[Machine, InputError]] = []
-    without: _Chosen | None = None
+    without: tuple[int, _Chosen] | None = None
     for name in MACHINES if known.machine is None else (known.machine,):
         machine = read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
         for dialects in groups:
             chosen = _best(path, known, machine, dialects, setup, refused)
-            if chosen is not None and any(f.code == NO_ROTARY for f in chosen.reading.findings):
-                # its tilted planes need another machine
-                without = without or chosen
-            elif chosen is not None:
+            if chosen is None:
+                continue
+            # its axes and its tilted planes need another machine
+            lacking = sum(f.code in (NO_ROTARY, MISSING_AXIS) for f in chosen.reading.findings)
+            if not lacking:
                 return chosen
+            if without is None or lacking < without[0]:
+                without = lacking, chosen
     if without is not None:
-        return without
-    raise _refusal(path, refused, known.machine is None)
+        return without[1]
+    raise _refusal(path, refused)
 
 
-def _refusal(path: Path, refused: Sequence[tuple[Machine, InputError]], shipped: bool) -> InputError:
-    """Why no machine reads a program: the first reason, or that of each machine where they differ by its axes."""
-    first: dict[str, str] = {}
-    for machine, err in refused:
-        first.setdefault(machine.name, str(err).removeprefix(f"{path.name}: "))
-    reasons = list(dict.fromkeys(first.values()))
-    if len(reasons) > 1 and shipped:
-        return InputError(
-            f"{path.name}: none of the machines {', '.join(first)} has its axes: {'; '.join(reasons)}: "
-            "name a machine that has (--on)"
-        )
-    why = reasons[0].removeprefix("no motion: nothing to check: ").removesuffix(": the block is left out (nc-not-read)")
+def _refusal(path: Path, refused: Sequence[tuple[Machine, InputError]]) -> InputError:
+    """Why no machine reads a program: the first reason."""
+    why = str(refused[0][1]).removeprefix(f"{path.name}: ")
+    why = why.removeprefix("no motion: nothing to check: ").removesuffix(": the block is left out (nc-not-read)")
     if "does not begin a word" in why:
         return InputError(f"{path.name}: neither NC text nor CL data nor a table with a heading of its columns: {why}")
     return refused[0][1]
