@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from chipload.errors import InputError
 
-__all__ = ["EXTRAS", "LateModule", "attach", "pa", "pq", "require_extra", "scipy", "trimesh"]
+__all__ = ["EXTRAS", "LateModule", "attach", "pa", "pa_csv", "pq", "require_extra", "scipy", "trimesh"]
 
 #: extra of the package -> the module that it installs, and what needs it
 EXTRAS: Mapping[str, tuple[str, str]] = {
@@ -100,10 +100,11 @@ class LateModule:
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    import pyarrow.csv as pa_csv
     import pyarrow.parquet as pq
     import scipy as scipy
     import trimesh as trimesh
 else:
     # half of what a check of a job takes, where it reads no mesh and solves nothing
     scipy, trimesh = LateModule("scipy"), LateModule("trimesh")
-    pa, pq = LateModule("pyarrow"), LateModule("pyarrow.parquet")
+    pa, pa_csv, pq = LateModule("pyarrow"), LateModule("pyarrow.csv"), LateModule("pyarrow.parquet")

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import math
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from chipload.control.logs import read_log
@@ -93,3 +97,64 @@ def test_files_that_are_none(tmp_path):
         path.write_text(text)
         with pytest.raises(InputError):
             read_log(path, one)
+
+
+class TestParquet:
+    """A Parquet file gives what a CSV file of the same rows gives."""
+
+    @pytest.fixture
+    def write(self, tmp_path):
+        def write(name: str = "log.parquet", **columns):
+            pq.write_table(pa.table(columns), tmp_path / name)
+            return tmp_path / name
+
+        return write
+
+    def test_columns_and_units(self, path, write):
+        made = write(
+            t=pa.array([0, 10, 20, 30, 15, 40]), n=pa.array([60.0, 120.0, None, 60.0, 60.0, 180.0]),
+            I=pa.array([1.5, 2.5, 3.0, None, 2.0, 4.0], pa.float32()),
+            what=pa.array(["air", "cut", "cut", "cut", "cut", ""]).dictionary_encode(),
+            other=pa.array([[1], [2], [3], [4], [5], [6]]),
+        )  # fmt: skip
+        log, findings = read_log(made, COLUMNS)
+        same, _ = read_log(path, COLUMNS)
+        for name in ("time", "speed", "current", "label"):
+            assert getattr(log, name).tolist() == getattr(same, name).tolist()
+        assert [(f.code, f.line) for f in findings] == [("log-row", 4)]
+
+    def test_names_and_times_of_day(self, write):
+        day = dt.datetime(2026, 1, 5, 6, 30, 0, 250_000)
+        times = [day, day + dt.timedelta(seconds=1.5), None, day + dt.timedelta(minutes=2)]
+        made = write("log", time_s=times, power_kw=[1.0, 2.0, 3.0, 4.0], line=[1, 1, 2, 3], note=["a", "b", "c", "d"])
+        log, findings = read_log(made)
+        assert log.time.tolist() == [0.0, 1.5, 120.0]
+        assert log.power.tolist() == [1e6, 2e6, 4e6]
+        assert log.line.tolist() == [1.0, 1.0, 3.0]
+        assert [(f.code, f.line) for f in findings] == [("log-row", 4)]
+
+    def test_refused(self, write, tmp_path):
+        time = {"column": "time", "unit": "ms"}
+        current = {"column": "I", "unit": "A"}
+        made = write(time=[dt.datetime(2026, 1, 5)], I=[1.0], list=[[1.0]])
+        for columns, text in (
+            (None, "no column of time and of current"),
+            ({"time": time, "current": current}, "column time holds times of day: it can only be time, in s"),
+            ({"sample_s": 1.0, "current": current | {"column": "J"}}, "no column J for current"),
+            ({"sample_s": 1.0, "current": current, "head": False}, "head = false: a Parquet file names its columns"),
+            ({"sample_s": 1.0, "current": current | {"column": "list"}}, "not a Parquet file of numbers and texts"),
+        ):
+            with pytest.raises(InputError, match=text):
+                read_log(made, columns)
+        cut = tmp_path / "cut.parquet"
+        cut.write_bytes(made.read_bytes()[:-20])
+        with pytest.raises(InputError, match="not a Parquet file"):
+            read_log(cut)
+
+    def test_many_rows_in_few_bytes(self, write):
+        made = write(time_s=pa.array(np.zeros(20_000_000)), power_w=pa.array(np.zeros(20_000_000)))
+        assert made.stat().st_size < 1 << 20
+        with pytest.raises(
+            InputError, match="20000000 rows of 2 columns: more than 268435456 bytes: cut it into parts"
+        ):
+            read_log(made)

@@ -40,7 +40,9 @@ LogColumns = Annotated[
 def learn(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG...", help="logs (CSV) of the program, in the order in which it ran with one tool"),
+        typer.Argument(
+            metavar="LOG...", help="logs (CSV, Parquet) of the program, in the order in which it ran with one tool"
+        ),
     ],
     job: Annotated[Path, typer.Option("--job", metavar="JOB", help="the job (TOML) of the program that ran")],
     out: Annotated[

@@ -137,7 +137,9 @@ def _write_panel(job: HalJob, file: Path, name: str, out: Path | None) -> int:
 
 @app.command()
 def spindle(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs (CSV) of cuts and of the idle spindle")],
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="logs (CSV, Parquet) of cuts and of the idle spindle")
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the spindle (TOML), for [spindle] file of a job")],
     columns: Annotated[
         Path | None,

@@ -1,4 +1,4 @@
-"""Reading of logs of a cut: columns of a CSV file, by name and unit.
+"""Reading of logs of a cut: columns of a CSV or Parquet file, by name and unit.
 
 Notation: t time [s], w spindle speed [rad/s], I spindle current [A], T torque [N mm], f feed [mm/s].
 
@@ -15,7 +15,8 @@ Quantities are ``time``, ``speed``, ``current``, ``power``, ``torque``, ``feed``
 of rows in the cut begin). Currents that were written in steps of a converter have the unit ``count``; what is made of
 them is in counts too. Without a table the columns are known by their names, as `time_s`, `speed_rpm`, `current_a`,
 `power_w`, `torque_nm`: what `chipload hal --out` writes is read so. A log without a head, as LinuxCNC's `halsampler`
-writes it, has ``head = false``; its columns are numbered from 1, and are separated by spaces.
+writes it, has ``head = false``; its columns are numbered from 1, and are separated by spaces. A Parquet file is known
+by its first bytes; its times of day become seconds after the first.
 """
 
 from __future__ import annotations
@@ -32,12 +33,15 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
 from chipload.files import read_regular
+from chipload.lazy import pa, pa_csv, pq
 from chipload.tables import nearest, read_table
 
 Floats = NDArray[np.float64]
 
 #: of a file that is read [bytes]
 MOST_BYTES = 1 << 28
+#: first bytes of a Parquet file
+PARQUET = b"PAR1"
 #: quantity -> unit -> factor to the unit inside
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3},
@@ -104,11 +108,11 @@ class _Columns:
 
 
 def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = None) -> tuple[SpindleLog, list[Finding]]:
-    """Read a log from a CSV file.
+    """Read a log from a CSV or Parquet file.
 
     Parameters
     ----------
-    path : CSV with a head of names, separated by commas
+    path : CSV with a head of names, separated by commas, or Parquet
     columns : the table of columns, or the path of its TOML file; None: the columns are known by their names
 
     Returns
@@ -123,9 +127,10 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
     """
     label = f"log {path}"
     stated = _check_columns(columns) if columns is not None else None
-    data = read_regular(path, label, MOST_BYTES, "cut it into parts").decode("utf-8-sig", "replace")
+    data = read_regular(path, label, MOST_BYTES, "cut it into parts")
+    text = _parquet_as_csv(label, data, stated) if data[:4] == PARQUET else data.decode("utf-8-sig", "replace")
     try:
-        names, rows = _table(data, stated is None or stated.head)
+        names, rows = _table(text, stated is None or stated.head)
         layout = stated or _by_name(label, names)
         places = {}
         for quantity, (name, _) in layout.wanted.items():
@@ -215,6 +220,43 @@ def _table(text: str, head: bool) -> tuple[list[str], Any]:
         return [name.strip() for name in next(rows, [])], rows
     lines = [line.split() for line in text.splitlines()]
     return [str(k + 1) for k in range(max(map(len, lines), default=0))], iter(lines)
+
+
+def _parquet_as_csv(label: str, data: bytes, stated: _Columns | None) -> str:
+    """Return the columns of a Parquet file that can be used, as the text of a CSV file; O(rows)."""
+    if stated is not None and not stated.head:
+        raise InputError(f"{label}: head = false: a Parquet file names its columns: leave it out")
+    used = KNOWN if stated is None else {name: (quantity, u) for quantity, (name, u) in stated.wanted.items()}
+    try:
+        with pq.ParquetFile(pa.BufferReader(data)) as file:
+            names = [name for name in file.schema_arrow.names if name in used]
+            if file.metadata.num_rows * max(len(names), 1) * 8 > MOST_BYTES:
+                raise InputError(
+                    f"{label}: {file.metadata.num_rows} rows of {len(names)} columns: more than {MOST_BYTES} bytes: "
+                    "cut it into parts"
+                )
+            table = file.read(names) if names else pa.table({name: [] for name in file.schema_arrow.names})
+        for place, name in enumerate(names):
+            column = table[name]
+            if pa.types.is_timestamp(column.type):
+                if used[name] != ("time", "s"):
+                    raise InputError(f"{label}: column {name} holds times of day: it can only be time, in s")
+                table = table.set_column(place, name, pa.array(_seconds_after_first(column), from_pandas=True))
+        out = pa.BufferOutputStream()
+        pa_csv.write_csv(table, out)
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as err:
+        raise InputError(f"{label}: not a Parquet file of numbers and texts: {err}") from None
+    return bytes(out.getvalue()).decode("utf-8", "replace")
+
+
+def _seconds_after_first(column: pa.ChunkedArray) -> Floats:
+    """Return times of day (n,) as seconds after the earliest; NaN where one is missing."""
+    times = column.combine_chunks().to_numpy(zero_copy_only=False).astype("datetime64[ns]")
+    missing = np.isnat(times)
+    if missing.all():
+        return np.full(len(times), np.nan)
+    seconds = (times - times[~missing].min()) / np.timedelta64(1, "s")
+    return np.where(missing, np.nan, seconds)
 
 
 def _by_name(label: str, names: list[str]) -> _Columns:
