@@ -324,3 +324,17 @@ def test_axes_that_cannot_reach_every_point_are_refused():
     machine = replace(machine, chain=Chain((ways[0], ways[1], Axis("Z", True, (0, 0, 1)), ways[2], spin)))
     with pytest.raises(InputError, match="C turns about the line of the spindle: hold it, or mark it indexed"):
         inverse(machine, np.zeros((1, 3)), [[0.0, 0.6, 0.8]])
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "tip", "axis"),
+    [("vmc-a", 3, (1.0, -3.0, 2.0), (0.0, -1.0, 0.0)), ("hmc-b", 4, (3.0, 2.0, -1.0), (1.0, 0.0, 0.0))],
+)
+def test_a_quarter_turn_of_one_rotary_axis(name, column, tip, axis):
+    """By hand: the tool at (1, 2, 3) turns right-handed about +X or +Y, as the workpiece sees it (ISO 841)."""
+    axes = np.zeros((1, 9))
+    axes[0, :3] = 1.0, 2.0, 3.0
+    axes[0, column] = np.pi / 2
+    p, direction = forward(machine_named(name), axes, np.zeros(1), np.zeros(3))
+    np.testing.assert_allclose(p[0], tip, atol=1e-12)
+    np.testing.assert_allclose(direction[0], axis, atol=1e-12)

@@ -5,6 +5,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
@@ -124,12 +125,29 @@ def test_d_of_other_dialects():
     assert commands.position[-1, 1] == pytest.approx(26.0)
 
 
-def test_a_length_that_is_not_known_matters_where_an_axis_turns(tmp_path: Path):
+def test_a_length_that_is_not_known_matters_where_an_axis_turns_the_tool(tmp_path: Path):
     path = tmp_path / "part.ngc"
-    path.write_text("T1 M6\nG43 H1\nG0 X0 Y0 Z50\nF600\nG1 X10\nM2\n")
-    for machine, severity in (("vmc", Severity.NOTE), ("xyzac-trunnion", Severity.UNPROVEN)):
+    path.write_text("T1 M6\nG43 H1\nG0 X0 Y0 Z50\nF600\nG1 X10 C30\nY5\nM2\n")
+    for machine, severity in (
+        ("vmc-a", Severity.NOTE),
+        ("xyzac-trunnion", Severity.NOTE),
+        ("xyzbc-head-table", Severity.UNPROVEN),
+    ):
         noticed = read_program(path, machine_named(machine)).findings
         assert [f.severity for f in noticed if f.code == "nc-length-unknown"] == [severity]
+
+
+@pytest.mark.parametrize(("machine", "same"), [("xyzac-trunnion", True), ("xyzbc-head-table", False)])
+def test_a_table_carries_the_tip_whatever_the_length(tmp_path: Path, machine, same):
+    """Two lengths give one path where the rotary axes are in the table, and two where one carries the tool."""
+    path = tmp_path / "part.ngc"
+    axis = "A" if same else "B"
+    path.write_text(f"T1 M6\nG43 H1\nG0 X0 Y0 Z50\nF600\nG1 X10 {axis}20 C30\nY5\nM2\n")
+    ends = []
+    for length in (10, 90):
+        tools = read_tool_table(f"T1 P1 D8 Z{length}\n")[0]
+        ends.append(read_program(path, machine_named(machine), tools=tools).program.p_work[-1])
+    assert np.allclose(*ends, atol=1e-9) == same
 
 
 def test_the_length_of_another_tool_leaves_the_result_unproven():

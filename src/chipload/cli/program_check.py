@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 #: [mm] default tolerance
 TOLERANCE_MM = 0.001
 #: default machines: the first that has the axes of the program is used
-GENERIC = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
+GENERIC = ("vmc", "vmc-a", "hmc-b", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
 
 
 def finding_lines(reading: ProgramReading) -> list[str]:

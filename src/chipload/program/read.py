@@ -62,7 +62,7 @@ ENDINGS: dict[str, Dialect | None] = {
     **dict.fromkeys((".h", ".hnc"), "heidenhain"),
     **dict.fromkeys((".apt", ".cls", ".cl", ".clt", ".cldata", ".aptsource", ".ncl"), "apt"),
 }
-#: findings that leave a result unproven where the machine has rotary axes, whose place depends on the tool's length
+#: findings that leave a result unproven where the place of the tip or of the axes depends on the tool's length
 OF_LENGTHS = ("nc-length-unknown", "heidenhain-tool-unknown")
 #: findings on retractions to positions of the machine that are not known, and so have no row
 OF_RETRACTIONS = ("nc-machine-retraction", "heidenhain-m91")
@@ -225,7 +225,7 @@ def read_program(
         commands, held = hold_missing_axes(commands, machine)
         findings += held
         program, more = to_work(commands, machine, tolerance=tolerance, placed=placed)
-        if machine.chain.rotary:
+        if _needs_lengths(commands, machine, placed):
             findings = tuple(replace(f, severity=Severity.UNPROVEN) if f.code in OF_LENGTHS else f for f in findings)
     if speed is not None:
         commands = replace(commands, spindle=_turning_speeds(commands.spindle, speed))
@@ -255,6 +255,16 @@ def read_program(
         findings=(*reading.findings, *_others(skipped.findings, reading.findings)),
         violations=(*reading.violations, *_others(skipped.violations, reading.violations)),
     )
+
+
+def _needs_lengths(commands: Commands, machine: Machine, placed: int | None) -> bool:
+    """Whether the path depends on the lengths of the tools: a rotary axis carries the tool, or, with an origin that is
+    stated, the axes themselves are compared with their travel.
+
+    In a table the rotary axes turn the workpiece alone: the control adds the length to Z, and the tip goes as written.
+    """
+    rotary, origin = machine.chain.rotary, work_frame(commands, placed)
+    return any(axis.head for axis in rotary) or (bool(rotary) and (origin.stated or bool(origin.offset.any())))
 
 
 def _others(findings: tuple[Finding, ...], known: tuple[Finding, ...]) -> Iterator[Finding]:

@@ -38,7 +38,9 @@ from chipload.program.tool_words import Stated, ToolKind
 from chipload.units import mm_s_from_mm_min, rpm_from_rad_s
 
 #: machines that a program is read for where none is stated: the first that has its axes
-MACHINES = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
+MACHINES = ("vmc", "vmc-a", "hmc-b", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
+#: those with one rotary axis: CL data, which state vectors, are read for more
+ONE_ROTARY = ("vmc-a", "hmc-b")
 #: language of programs that show nothing
 MACHINES_LANGUAGE = "linuxcnc"
 #: NC texts longer than this are read in one dialect only [bytes]
@@ -221,7 +223,7 @@ def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None)
         machine = read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
         for dialects in groups:
             chosen = _best(path, known, machine, dialects, setup, refused)
-            if chosen is None:
+            if chosen is None or (name in ONE_ROTARY and chosen.reading.recognition is None):
                 continue
             # its axes and its tilted planes need another machine
             lacking = sum(f.code in (NO_ROTARY, MISSING_AXIS) for f in chosen.reading.findings)
