@@ -164,7 +164,7 @@ def _blocks(control: Control, family: bool = False) -> list[str]:
     changed = {code: to for code, to in control.text.codes.items() if code not in unread}
     left = dict.fromkeys(UNREAD, "threading cycles of a lathe")
     if family:
-        left |= {code: "involutes" if code == 62 else "splines" for code in fanuc.LEFT_OUT}
+        left |= dict.fromkeys(fanuc.LEFT_OUT, "splines")
         left |= dict(fanuc.CHANGED) | dict(fanuc.NOT_READ)
         left |= {code: what for code, (_, what) in fanuc.NOT_READ_WITH.items()}
         if 1500 not in unread:

@@ -189,6 +189,6 @@ def test_fanuc_fine_boring_and_what_is_left_out():
     assert commands.position[fed, 2].tolist() == [-9.0, -9.0]
     assert commands.feed[commands.motion == DWELL].tolist() == [0.5, 0.5]
     assert codes(findings) == ["nc-fine-boring"]
-    commands, findings = fanuc("G0 X1.\nG6.2 X4. K1.\nX5.\nG0 X2.\nM30")
+    commands, findings = fanuc("G0 X1.\nG6.1 X4. K1.\nX5.\nG0 X2.\nM30")
     assert commands.position[:, 0].tolist() == [1.0, 2.0]
     assert [f.line for f in findings if f.severity is Severity.UNPROVEN] == [2, 3]

@@ -100,8 +100,8 @@ NOT_READ_WITH = {
 }
 #: codes whose axes are no positions: the area of a stored limit, axes that are smoothed
 NO_POSITIONS = {220: "xyzijk", 51: "xyzabc"}
-#: motions that are left out: involutes, splines
-LEFT_OUT = frozenset({61, 62})
+#: motions that are left out: splines through points
+LEFT_OUT = frozenset({61})
 #: rigid tapping: LinuxCNC's code
 TAPPING = {842: 840, 843: 740}
 #: tapping itself, and pecks that break the chip: K of a Haas and J of an Okuma lift the drill out after a depth

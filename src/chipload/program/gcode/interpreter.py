@@ -19,6 +19,7 @@ from chipload.program.gcode import offsets, targets
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.cycles import TAPPING
 from chipload.program.gcode.expression import integer_of
+from chipload.program.gcode.knotted_splines import SPLINE
 from chipload.program.gcode.mirror import mirror
 from chipload.program.gcode.modal import USER_M, check_codes, code_text, motion_of, motion_of_group_one, unused_letters
 from chipload.program.gcode.motion import ControllerMotion
@@ -90,6 +91,8 @@ class BlockInterpreter:
             motion = motion_of(block, codes, lasting)
         if motion < 0 and lasting == 52 and "p" in block.words and "motion" not in codes:
             motion = 52
+        if motion < 0 and self.motion.knotted.is_open and "k" in block.words and "motion" not in codes:
+            motion = SPLINE
         for letter in unused_letters(block, motion):
             message = f"{letter.upper()}{block.words[letter]:g}: no code of the block uses it"
             if c.strict:

@@ -17,7 +17,7 @@ from chipload.program.gcode.words import Block
 #: groups of G codes: one code of each in a block
 GROUPS: dict[str, tuple[int, ...]] = {
     "once": (40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923),
-    "motion": (0, 10, 20, 30, 50, 51, 52, 53, 330, 331, 382, 383, 384, 385, 760, *sorted(CYCLES)),
+    "motion": (0, 10, 20, 30, 50, 51, 52, 53, 62, 330, 331, 382, 383, 384, 385, 760, *sorted(CYCLES)),
     "none": (NO_MOTION,),
     "plane": (170, 171, 180, 181, 190, 191),
     "distance": (900, 910),
@@ -61,15 +61,15 @@ USES: dict[str, tuple[frozenset[int], frozenset[int], frozenset[int]]] = {
     "h": (frozenset({760}), frozenset({430, 432, 434}), frozenset()),
     "i": (frozenset({20, 30, 50, 51, 331, 760, 870, FANUC_BACK_BORING}), frozenset({100}), frozenset()),
     "j": (frozenset({20, 30, 50, 51, 760, 870, FANUC_BACK_BORING}), frozenset({100}), frozenset()),
-    "k": (frozenset({20, 30, 330, 331, 760, 870}), frozenset(), frozenset()),
+    "k": (frozenset({20, 30, 62, 330, 331, 760, 870}), frozenset(), frozenset()),
     "l": (CYCLES | {52, 53, 760}, frozenset({100, 410, 411, 420, 421}), frozenset({66, 98})),
     "p": (
-        NEED_P | {20, 30, 50, 52, 740, 760, 840, FANUC_BACK_BORING},
+        NEED_P | {20, 30, 50, 52, 62, 740, 760, 840, FANUC_BACK_BORING},
         frozenset({40, 100, 640}),
         frozenset({*range(50, 54), *range(62, 67), 19, 98}),
     ),
-    "q": (NEED_Q | {50, 760}, frozenset({100, 640}), frozenset({19, 61, 66, 67, 68})),
-    "r": (CYCLES | {20, 30, 760}, frozenset({100, 640}), frozenset({19})),
+    "q": (NEED_Q | {50, 62, 760}, frozenset({100, 640}), frozenset({19, 61, 66, 67, 68})),
+    "r": (CYCLES | {20, 30, 62, 760}, frozenset({100, 640}), frozenset({19})),
     "$": (frozenset({330, 331, 740, 760, 840}), frozenset({950, 960, 970}), frozenset({3, 4, 5, 19, 51})),
 }
 

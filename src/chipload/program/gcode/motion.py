@@ -16,6 +16,7 @@ from chipload.program.gcode.controller import PLANES, Controller
 from chipload.program.gcode.cycles import CYCLES
 from chipload.program.gcode.drilling import Drilling
 from chipload.program.gcode.expression import integer_of
+from chipload.program.gcode.knotted_splines import SPLINE, KnottedSplines
 from chipload.program.gcode.modal import GROUP_ONE, code_text
 from chipload.program.gcode.offsets import in_machine_unknown, note_machine_coordinates, probe_motion
 from chipload.program.gcode.splines import Splines
@@ -37,12 +38,15 @@ class ControllerMotion:
         self.c = controller
         self.drilling = Drilling(controller)
         self.splines = Splines(controller)
+        self.knotted = KnottedSplines(controller)
 
     def move(self, block: Block, code: int, machine: bool) -> None:
         """Carry out the motion ``code`` of a block; ``machine``: G53 stands in it."""
         state = self.c.state
         if self.splines.spline is not None and code not in (52, 53):
             raise InputError(f"{code_text(code)}: G5.2 is open: close it by G5.3")
+        if code != SPLINE:
+            self.knotted.end()
         if code != 50:
             self.splines.tangent = (0.0, 0.0)
         if code not in CYCLES:
@@ -53,6 +57,8 @@ class ControllerMotion:
             raise InputError(f"{self.c.machine_word} with {code_text(code)}: goes with G0 and G1 only")
         elif code in (20, 30):
             self._arc(block, code)
+        elif code == SPLINE:
+            self.knotted.move(block)
         elif code in (50, 51, 52, 53):
             self.splines.move(block, code)
             if code in (50, 51):
