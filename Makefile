@@ -29,14 +29,16 @@ $(VENV)/.ready: $(VENV)/.run requirements.lock
 
 CHECKED := $(VENV)/checked.log
 COLLECTED := $(VENV)/collected.log
+# files that may call what only one system has; their types are checked for the other systems too, in seconds
+CALLERS = $$(grep -rlE '^\s*(import|from) (asyncio|ctypes|errno|fcntl|mmap|msvcrt|multiprocessing|os|pty|resource|select|selectors|signal|socket|stat|subprocess|sys|termios|threading|time)\b' src/chipload)
+FOREIGN = $(BIN)/mypy --config-file tools/platform_types.ini --cache-dir .mypy_cache/foreign
 
 # the slow checks beside the tests, so that no core waits; what they say stands at the end. The tests are collected once
 # before their workers start: that compiles what is compiled when it is imported, kernels whose types are stated and the
 # assertions of the tests. Each worker would do it again
 test: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .
-	{ $(BIN)/mypy && $(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 \
-	  && $(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin \
+	{ $(BIN)/mypy && $(FOREIGN) --platform win32 $(CALLERS) && $(FOREIGN) --platform darwin $(CALLERS) \
 	  && $(BIN)/lint-imports && $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site; } \
 	  > $(CHECKED) 2>&1 & checks=$$!; \
 	{ $(BIN)/pytest -p no:xdist --collect-only -qq > $(COLLECTED) 2>&1 || { cat $(COLLECTED); false; }; } \
