@@ -216,6 +216,41 @@ def test_slots_along_a_circle(finishing):
     assert (z[off > 0.15] == 0.0).all()
 
 
+@pytest.mark.parametrize(("cdir", "sense"), [(0, -1), (1, 1), (2, -1), (3, 1)])
+@pytest.mark.parametrize(
+    ("body", "round_one"),
+    [
+        ("CYCLE76(10,0,2,-5,,30,20,4,1,2,30,2.5,0,0,500,100,{},1,40,28)", False),
+        ("CYCLE77(10,0,2,,5,24,1,2,2.5,0,0,500,100,{},1,36)", True),
+    ],
+)
+def test_a_spigot_of_a_sinumerik(body, round_one, cdir, sense):
+    """As a stud of a Heidenhain; the blank of 40 x 28, or of the diameter 36, is at its depth, the spigot stands."""
+    commands, findings = si(body.format(cdir))
+    assert codes(findings) == ["nc-pocket-path"]
+    z, p = ground(commands, 1 + 2j)
+    q = p * cmath.exp(-1j * math.radians(0.0 if round_one else 30.0))
+    off = np.abs(q) - 12.0 if round_one else rectangle(q, 15.0, 10.0, 4.0)
+    blank = np.abs(q) - 18.0 if round_one else rectangle(q, 20.0, 14.0, 0.0)
+    assert (z[off < -0.15] == 0.0).all()
+    assert (z[(off > 0.15) & (blank < -0.15)] == -5.0).all()
+    assert {int(np.sign(t)) for t in commands.turns[commands.motion == ARC]} == {sense}
+    assert commands.position[-1, 2] == 10.0
+
+
+def test_allowances_of_a_spigot():
+    """Roughing leaves 0.5 mm on the wall and 1 mm on the floor, finishing takes both: 12 + 3 mm is its ring."""
+    rough_z, p = ground(si("CYCLE77(10,0,2,-5,,24,1,2,2.5,0.5,1,500,100,0,1,36)")[0], 1 + 2j)
+    off = np.abs(p) - 12.0
+    assert (rough_z[off < 0.35] == 0.0).all()
+    assert rough_z.min() == -4.0
+    commands, _ = si("CYCLE77(10,0,2,-5,,24,1,2,5,0.5,1,500,100,0,2,36)")
+    fine_z, _ = ground(commands, 1 + 2j)
+    assert (fine_z[(off > 0.15) & (off < 0.5)] == -5.0).all()
+    arcs = commands.position[commands.motion == ARC][:, :2] - (1.0, 2.0)
+    np.testing.assert_allclose(np.hypot(*arcs.T), 15.0)
+
+
 @pytest.mark.parametrize("vari", [11, 21, 31, 41])
 @pytest.mark.parametrize(("length", "width"), [(30.0, 14.0), (-30.0, -14.0)])
 def test_a_face_of_a_sinumerik(vari, length, width):

@@ -165,9 +165,19 @@ def _guesses(
     return out
 
 
+def size_of_name(name: str) -> float | None:
+    """Diameter [mm] by the only number of a name; None: it has none or several, or it is none of a tool.
+
+    >>> size_of_name("FRAESER_16"), size_of_name("EM12R1")
+    (16.0, None)
+    """
+    numbers = [float(n) for n in re.findall(r"[0-9]+(?:\.[0-9]+)?", name)]
+    return numbers[0] if len(numbers) == 1 and 0.1 <= numbers[0] <= 100.0 else None
+
+
 def _of_name(name: str, why: str) -> tuple[float, str]:
     """Diameter [mm] by the only number of a name, else a usual one."""
-    numbers = [float(n) for n in re.findall(r"[0-9]+(?:\.[0-9]+)?", name)]
-    if len(numbers) == 1 and 0.1 <= numbers[0] <= 100.0:
-        return numbers[0], f"the number in its name, {name[:50]}"
+    own = size_of_name(name)
+    if own is not None:
+        return own, f"the number in its name, {name[:50]}"
     return 10.0, f"no file states it{f'; {why}' if why else ''}"

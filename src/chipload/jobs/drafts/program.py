@@ -15,7 +15,7 @@ from chipload.cutter.table import cutter_from_table
 from chipload.errors import Finding, InputError, Severity, group_findings
 from chipload.files import read_regular
 from chipload.jobs.drafts.comments import Box, Header, read_header
-from chipload.jobs.drafts.cutters import cutter_table
+from chipload.jobs.drafts.cutters import cutter_table, size_of_name
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
 from chipload.jobs.drafts.setups import lines_of_setups, setup_tables
 from chipload.machine.machine import Machine, machine_named, read_machine
@@ -187,12 +187,14 @@ def _kind_by_motions(program: Program, cuts: np.ndarray) -> Stated:
 
 
 def _cutters(program: Program, known: Known, header: Header) -> dict[int, Cutter]:
-    """The tools of a program whose diameter is stated, for the compensation of its path."""
+    """The tools of a program whose diameter is stated, or in their name, for the compensation of its path."""
     out: dict[int, Cutter] = {}
+    cuts = _rows_at_feed(program)
     for n in (int(n) for n in np.unique(program.tool)):
         sources = _stated_values(n, known, header)
-        if any("diameter_mm" in source for source in sources):
-            entries = cutter_table(n, sources).entries
+        names = [str(source["name"][0]) for source in sources if "name" in source]
+        if any("diameter_mm" in source for source in sources) or any(size_of_name(name) for name in names):
+            entries = cutter_table(n, sources, motions=_kind_by_motions(program, cuts & (program.tool == n))).entries
             out[n] = cutter_from_table({e.key: e.value for e in entries if e.value is not None})
     return out
 

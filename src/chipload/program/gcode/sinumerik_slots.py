@@ -1,4 +1,4 @@
-"""Slots and faces of a Sinumerik: LONGHOLE, SLOT1, SLOT2 on a circle, and CYCLE71.
+"""Slots, faces and spigots of a Sinumerik: LONGHOLE, SLOT1, SLOT2 on a circle, CYCLE71, CYCLE76 and CYCLE77.
 
 Notation: NUM slots about CPA, CPO, the first at STA1, INDA [deg] between them, 0: evenly all round. RTP, RFP, SDIS and
 DP, or DPR below RFP, are the heights of a pocket; FFD feed down, FFP1 along, MID at most a pass.
@@ -12,8 +12,13 @@ DP, or DPR below RFP, are the heights of a pocket; FFD feed down, FFP1 along, MI
   diameters; FDP beyond the face, FALD left on the floor; VARI tens 1 along the first axis one way, 2 along the second,
   3 and 4 the same to and fro.
 
-Reference: Siemens, SINUMERIK 840D sl Programming Manual Cycles, "Milling cycles". Order of the arguments and that RAD
-is where a slot begins (LONGHOLE, SLOT1), or its middle line (SLOT2), are from memory.
+* CYCLE76: a spigot of LENG x WID with corners CRAD about PA, PO, turned by STA, out of a blank of AP1 x AP2. CYCLE77:
+  one of the diameter PRAD out of the diameter AP1. Without AP1 the allowance FAL alone stands about it. VARI 1 roughs,
+  2 finishes.
+
+Reference: Siemens, SINUMERIK 840D sl Programming Manual Cycles, "Milling cycles". The order of the arguments up to the
+angle agrees with the reader of another public program, ncplot7py; the rest of it, and that RAD is where a slot begins
+(LONGHOLE, SLOT1), or its middle line (SLOT2), are from memory.
 """
 
 from __future__ import annotations
@@ -28,7 +33,7 @@ from chipload.program.commands import LINE, RAPID
 from chipload.program.face_cycles import FaceCycle, face_steps
 from chipload.program.gcode.dialect import NotReadError
 from chipload.program.gcode.sinumerik_pockets import USUAL_STEP, begin_cycle, carry_out, named_values, pass_sense
-from chipload.program.pocket_cycles import PocketCycle, Step, finish, levels, rough
+from chipload.program.pocket_cycles import PocketCycle, Step, finish, levels, rough, stud
 from chipload.program.slot_cycles import ArcSlot, arc_slot_steps
 
 if TYPE_CHECKING:
@@ -36,6 +41,7 @@ if TYPE_CHECKING:
 
 _HEIGHTS = "RTP RFP SDIS DP DPR NUM"
 _FACE = "RTP RFP SDIS DP PA PO LENG WID STA"
+_SPIGOT = "MID FAL FALD FFP1 FFD CDIR VARI"
 _LAST = "CPA CPO RAD STA1 INDA FFD FFP1 MID CDIR FAL VARI MIDF FFP2 SSF"
 #: arguments of each cycle
 SLOTS = {
@@ -43,14 +49,20 @@ SLOTS = {
     "SLOT1": tuple(f"{_HEIGHTS} LENG WID {_LAST} FALD STA2 DP1".split()),
     "SLOT2": tuple(f"{_HEIGHTS} AFSL WID {_LAST} FFCP".split()),
     "CYCLE71": tuple(f"{_FACE} MID MIDA FDP FALD FFP1 VARI FDP1".split()),
+    "CYCLE76": tuple(f"RTP RFP SDIS DP DPR LENG WID CRAD PA PO STA {_SPIGOT} AP1 AP2".split()),
+    "CYCLE77": tuple(f"RTP RFP SDIS DP DPR PRAD PA PO {_SPIGOT} AP1".split()),
 }
 _NEEDED = {
     "LONGHOLE": ("RTP", "RFP", "NUM", "LENG", "CPA", "CPO", "RAD", "STA1"),
     "SLOT1": ("RTP", "RFP", "NUM", "LENG", "WID", "CPA", "CPO", "RAD", "STA1"),
     "SLOT2": ("RTP", "RFP", "NUM", "AFSL", "WID", "CPA", "CPO", "RAD", "STA1"),
     "CYCLE71": ("RTP", "RFP", "DP", "PA", "PO", "LENG", "WID", "MID"),
+    "CYCLE76": ("RTP", "RFP", "LENG", "WID", "PA", "PO"),
+    "CYCLE77": ("RTP", "RFP", "PRAD", "PA", "PO"),
 }
 _ANGLES = frozenset({"STA1", "INDA", "AFSL", "STA", "STA2", "NUM", "VARI", "CDIR", "SSF"})
+#: cycles at one place
+ONE_PLACE = ("CYCLE71", "CYCLE76", "CYCLE77")
 #: most slots of one cycle
 MOST_SLOTS = 1000
 
@@ -69,9 +81,10 @@ def mill_slots(name: str, arguments: list[float | None], c: Controller) -> None:
         if "DPR" not in values:
             raise NotReadError(f"{name}: DP or DPR must be given")
         values["DP"] = values["RFP"] - abs(values["DPR"])
-    if name == "CYCLE71":
+    if name in ONE_PLACE:
         turn = cmath.rect(1.0, math.radians(values.get("STA", 0.0)))
-        carry_out(_face(values, radius, c), complex(values["PA"], values["PO"]), turn, values, c)
+        steps = _face(values, radius, c) if name == "CYCLE71" else _spigot(values, radius, c)
+        carry_out(steps, complex(values["PA"], values["PO"]), turn, values, c)
         return
     count = round(values["NUM"])
     if not 1 <= count <= MOST_SLOTS:
@@ -169,3 +182,26 @@ def _face(values: dict[str, float], radius: float, c: Controller) -> Iterator[St
     passes = [values["DP"]] if last else _passes(values, abs(values.get("FALD", 0.0)))
     for kind, x, y, z, rate, centre, turns in face_steps(face, _clear(values), passes):
         yield kind, *((y, x) if turned else (x, y)), z, rate, centre, turns
+
+
+def _spigot(values: dict[str, float], radius: float, c: Controller) -> Iterator[Step]:
+    feed, down = _feeds(values, c)
+    kind, wall, floor = _parts({"VARI": 1.0, **values})
+    if "PRAD" in values:
+        a = b = corner = 0.5 * abs(values["PRAD"])
+        blank = (0.5 * abs(values.get("AP1", 0.0)),) * 3
+    else:
+        a, b, corner = 0.5 * abs(values["LENG"]), 0.5 * abs(values["WID"]), abs(values.get("CRAD", 0.0))
+        blank = (0.5 * abs(values.get("AP1", 0.0)), 0.5 * abs(values.get("AP2", 0.0)), 0.0)
+    around = (a + wall, b + wall, corner + wall)
+    if kind == 2 or blank[0] < around[0] or blank[1] < around[1]:
+        blank = around
+    # climb milling goes clockwise about a spigot
+    sense = 1 if round(values.get("CDIR", 0.0)) in (1, 3) else -1
+    spigot = PocketCycle(a, b, corner, radius, 2.0 * USUAL_STEP * radius, sense, feed, down)
+    passes = _passes(values, floor if kind != 2 else 0.0)
+    last: Step | None = None
+    for last in stud(spigot, blank, wall if kind != 2 else 0.0, _clear(values), passes):
+        yield last
+    if last is not None:
+        yield RAPID, last[1], last[2], _clear(values), 0.0, (0.0, 0.0), 0
