@@ -81,9 +81,26 @@ def test_the_history_is_that_of_the_text(finished) -> None:
     texts = [data.decode() for name, data in files.items() if USED in name]
     assert len(texts) == 2
     assert all("verified by independent simulation" in text.lower() and "NOT VERIFIED" not in text for text in texts)
-    # what rows are found by: the rows of the plan, in order
-    assert (np.diff(c["line"]) >= 0).all()
-    assert set(c["line"]) <= set(one.program.line)
+
+
+def test_lines_are_those_of_the_written_text(finished) -> None:
+    """A step ends on the motion of its line: where the text states the place of the cutter, it is the step's."""
+    for name, one in finished.outcome.variants.items():
+        text = finished.outcome.texts[name].splitlines()
+        reading, _ = written._read(finished.outcome, one, finished.outcome.texts[name])
+        c, read = one.columns, reading.program
+        assert (np.diff(c["line"]) >= 0).all()
+        assert set(c["line"]) <= set(np.asarray(read.line).tolist())
+        assert all(re.search(r"[XYZBCA]-?\d", text[line - 1]) for line in set(c["line"].tolist())), name
+        # the last step of each line stands where the text has come to there
+        last = np.flatnonzero(np.diff(c["line"], append=-1))
+        at = np.column_stack([c[f"{x}_mm"] for x in "xyz"])[last]
+        end = {int(line): read.p_work[k] for k, line in enumerate(np.asarray(read.line))}
+        off = np.linalg.norm(at - np.array([end[int(line)] for line in c["line"][last]]), axis=1)
+        assert np.quantile(off, 0.95) < 1e-3, name
+    checks = {c.name: c for c in finished.result.tracks[0].limits}
+    used = finished.outcome.texts[USED].splitlines()
+    assert re.search(r"[XYZ]-?\d", used[checks["deflection_workpiece_um"].line - 1])
 
 
 @pytest.mark.parametrize("change", CHANGES)

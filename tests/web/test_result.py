@@ -189,6 +189,24 @@ def test_rows_follow_the_lines_of_a_text_that_numbers_otherwise(root: Path) -> N
     assert source_of(both, both.tracks[0]).name == "0-program.apt"
 
 
+def test_a_program_for_turning_axes_is_shown_with_the_lines_of_its_history(tmp_path: Path) -> None:
+    """Its axes do not stand where the tool cuts, so no row can be followed: the history counts in its lines."""
+    one = square_result()
+    columns = dict(one.tracks[0].columns)
+    tilted = {"axis_x": np.full(ROWS, 0.6), "axis_y": np.zeros(ROWS), "axis_z": np.full(ROWS, 0.8)}
+    track = replace(one.tracks[0], programs=("0-turned.ngc", "0-program.apt"), blocks=in_memory({**columns, **tilted}))
+    result = replace(one, tracks=(track,), provenance=replace(one.provenance, inputs={}))
+    folder = write_by_hand(result, tmp_path / "r")
+    (folder / "0-turned.ngc").write_text("".join(f"X{k} B30 C{k}\n" for k in range(1, 13)))
+    r = open_result(tmp_path, "r")
+    own = source_of(r, r.tracks[0])
+    assert own.name == "0-turned.ngc"
+    assert own.of_row.tolist() == LINE.tolist()
+    # a text with fewer lines is another one
+    (folder / "0-turned.ngc").write_text("X1 B30\n")
+    assert source_of(r, r.tracks[0]).name == "0-program.apt"
+
+
 def test_a_text_with_new_feeds_is_shown_in_the_place_of_the_old_one(root: Path) -> None:
     path = root / "r" / "summary.json"
     text = path.read_text()

@@ -1,9 +1,10 @@
 """The program of a track, and the line of each row of its history.
 
 The text is the one with new feeds where the result holds one, else the original where the opened folder has it (found
-by the hash that the result states), else the program that the result holds for the machine, else its CL data. Where
-the history does not count in the lines of that text, rows are followed along its motions: each row lies on the motion
-that is shown, within a tolerance.
+by the hash that the result states), else the program that the result holds for the machine, else its CL data. The
+history of a program that was written for turning axes counts in the lines of its text. Where the history does not
+count in the lines of the text, rows are followed along its motions: each row lies on the motion that is shown, within
+a tolerance.
 """
 
 from __future__ import annotations
@@ -75,6 +76,8 @@ def source_of(result: PageResult, track: PageTrack) -> TrackText | None:
             path = result.file(name)
             if path.stat().st_size > LARGEST:
                 continue
+            if wanted is None and path.suffix != ".apt" and _counts_in(path, track):
+                return TrackText(path.name, _lines(path), np.asarray(track.line), "")
             program = read_apt_file(path)[0] if path.suffix == ".apt" else _read_axes(path, result)
         except (ChiploadError, OSError):
             continue
@@ -127,6 +130,12 @@ def follow_lines(place: Floats, program: Program) -> Ints:
             skipped += 1
         out[k] = line[j]
     return out[np.searchsorted(rows, np.arange(n), side="right") - 1]
+
+
+def _counts_in(path: Path, track: PageTrack) -> bool:
+    """Whether the history counts in the lines of a program: of one that was written for axes that turn it does."""
+    turns = bool((track.axis[:, 2] < 1.0 - 1e-9).any())
+    return turns and track.line is not None and 0 < int(track.line.max()) <= len(_lines(path))
 
 
 def _read_axes(path: Path, result: PageResult) -> Program | None:

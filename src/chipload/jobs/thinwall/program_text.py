@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from chipload.checking.preparation import time_rows
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.thinwall.outcome import USED, ThinWallResult, Variant
@@ -14,7 +17,14 @@ from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.tries import Tried
 from chipload.program.gcode.writer import write_commands
 from chipload.program.read import ProgramReading
-from chipload.program.read_back import no_end, read_back, reading_findings, rows_of_source, unread
+from chipload.program.read_back import (
+    compared_rows,
+    no_end,
+    read_back,
+    reading_findings,
+    rows_of_source,
+    unread,
+)
 from chipload.program.release import NOT_SIMULATED, Release
 from chipload.report.programs import ENDINGS, program_name
 
@@ -51,16 +61,49 @@ def program_file(walled: ThinWallResult, one: Variant) -> str:
 def with_texts_read_back(walled: ThinWallResult, tried: Tried) -> ThinWallResult:
     """A result whose variants have the findings of their texts, read back with the machine and compared with their
     plans. The text of the variant in use is simulated as it was read: its history and its checks are those of the text.
+    The lines of all histories and findings are those of the texts.
     """
     made, texts = dict[str, Variant](), dict[str, str]()
     for name, one in walled.variants.items():
         text = program_text(walled, one, NOT_SIMULATED)
         reading, found = _read(walled, one, text)
-        findings = (*one.beyond, *(f for f in found if f not in one.beyond))
         if name == USED and reading is not None and not any(f.severity is Severity.EXCEEDS for f in found):
             one = _simulated_text(walled, one, reading, tried)
+        one = with_lines_of_text(one, reading)
+        findings = (*one.beyond, *(f for f in found if f not in one.beyond))
         made[name], texts[name] = replace(one, beyond=findings), text
     return replace(walled, variants=made, texts=texts)
+
+
+def with_lines_of_text(one: Variant, reading: ProgramReading | None) -> Variant:
+    """A variant whose lines are those of its text instead of the numbers of its cutter locations; 0: no line of it.
+
+    ``reading``: the text as it was read; None: it cannot be read, and no line is known.
+    """
+    program = one.program
+    lines = np.zeros(len(program), dtype=np.int64)
+    ends = np.full(len(program), -1) if reading is None else compared_rows(program, reading)[1]
+    known = np.flatnonzero(ends >= 0)
+    if reading is not None and len(known):
+        # a motion that the text leaves out belongs to the next one of it
+        after = np.minimum(np.searchsorted(known, np.arange(len(program))), len(known) - 1)
+        lines = np.asarray(reading.program.line)[ends[known[after]]]
+
+    def of_text(line: NDArray[np.int64]) -> NDArray[np.int64]:
+        row = np.searchsorted(program.line, line)
+        there = program.line[np.minimum(row, len(program) - 1)] == line
+        return np.where(there, lines[np.minimum(row, len(program) - 1)], 0)
+
+    def moved(line: int) -> int:
+        return int(of_text(np.array([line]))[0]) if line else 0
+
+    touched = tuple(replace(c, line=moved(c.line)) for c in one.shape.collisions)
+    return replace(
+        one,
+        columns={**one.columns, "line": of_text(np.asarray(one.columns["line"], dtype=np.int64))},
+        shape=replace(one.shape, collisions=touched),
+        beyond=tuple(replace(f, line=moved(f.line)) for f in one.beyond),
+    )
 
 
 def _read(walled: ThinWallResult, one: Variant, text: str) -> tuple[ProgramReading | None, tuple[Finding, ...]]:
@@ -74,7 +117,7 @@ def _read(walled: ThinWallResult, one: Variant, text: str) -> tuple[ProgramReadi
 
 
 def _simulated_text(walled: ThinWallResult, one: Variant, reading: ProgramReading, tried: Tried) -> Variant:
-    """A variant as the simulation of its text finds it, which names the lines of its program."""
+    """A variant as the simulation of its text finds it, which names the lines of its plan."""
     program, times = time_rows(reading, walled.planning.cutters, walled.planning.machine)
     lines = one.program.line[rows_of_source(one.program, reading)][len(reading.program) - len(program) :]
     return tried.prove_text(one, replace(program, line=lines), times)

@@ -115,6 +115,8 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     stress = _limit_check("stress_mpa", strength, one.stress, one, limit_error(walled, one, "stress_mpa"))
     out += [with_budget(check, walled.checks, c) for check in (force, stress)]
     gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
+    # the written text rounds its places: what is less than its last digit is no gouge
+    gouge = gouge if gouge >= 10.0**-walled.planning.machine.decimals else 0.0
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
     state, why = state_of(gouge, tolerance + one.shift, 0.0)[0], ""
     if one.shift > 0.0 and state is Verdict.HOLDS:
