@@ -19,7 +19,7 @@ from chipload.cli import app
 from chipload.number_text import number_text
 from chipload.result import Verdict, load_result
 from square import two_variants, write_by_hand
-from web_lists import press_until
+from web_lists import VIEW, press_until
 from web_served import Served
 
 EXAMPLES = Path(__file__).parents[2] / "src" / "chipload" / "examples"
@@ -242,6 +242,23 @@ def test_the_failing_variant_shows_its_failure(opened, page_of) -> None:
     assert page.locator(".cl-checks tbody tr").all_inner_texts()[0].split()[:3] == ["force", "900", "800"]
     page.locator(".cl-found .cl-grave").get_by_text("line 8: the path leaves the workpiece").wait_for()
     page.locator(".cl-found").get_by_text("constant is not in use").wait_for()
+
+
+def test_what_does_not_cut_is_drawn_thin(opened, page_of) -> None:
+    """Motions in air are lines of one pixel, which hide nothing; cuts are wide and in the colours of the column."""
+    page = page_of("feeds")
+    history = pq.read_table(opened[0] / "feeds" / "result" / "history.parquet").to_pandas()
+    used = next(t["name"] for t in summary_of(opened[0] / "feeds" / "result")["tracks"] if t["in_use"])
+    cuts = (history.loc[history["track"] == used, "chip_volume_mm3"].to_numpy() > 0.0)[1:]
+    page.wait_for_function(f"{VIEW}.frames > 0")
+    thin, wide = page.evaluate(
+        f"""[true, false].map(thin => {VIEW}.path.sets.filter(s => Boolean(s.lines.isLineSegments2) !== thin)
+        .reduce((n, s) => n + (thin ? s.lines.geometry.attributes.position.count / 2
+        : s.lines.geometry.attributes.instanceStart.count), 0))"""
+    )
+    assert (thin, wide) == (int((~cuts).sum()), int(cuts.sum()))
+    assert 0 < thin < wide
+    assert "in air" in page.inner_text(".cv-bar")
 
 
 @pytest.mark.parametrize("name", RUNS)

@@ -1,5 +1,6 @@
 """What the page makes of a result, without a browser: against the numbers that the result was written with."""
 
+import hashlib
 import json
 import math
 import re
@@ -291,7 +292,7 @@ def test_a_million_rows_keep_their_extremes(tmp_path: Path) -> None:
     assert (np.nanmax(drawn["y"]), np.nanmin(drawn["y"])) == (5000.0, -70.0)
     assert drawn["x"][int(np.nanargmax(drawn["y"]))] == t[123_456]
     assert np.isnan(drawn["y"]).any()
-    rows = drawn_rows(scene.view_path(track), values)
+    rows = drawn_rows(scene.view_path(r, track), values)
     assert len(rows) < 1.2 * POINTS
     assert {0, n - 1, 123_456, 777_777} <= set(rows.tolist())
 
@@ -321,6 +322,23 @@ def test_what_is_in_the_folder_and_what_is_not(root: Path, tmp_path_factory: pyt
         with pytest.raises(InputError, match="must be the name of a folder in the opened one"):
             target_in(root, out)
     assert target_in(root, "new/deep") == root / "new" / "deep"
+
+
+def test_a_result_beside_its_job_is_opened_with_it(tmp_path: Path) -> None:
+    """`chipload run part/job.toml --out result`, then `chipload view result`: job and program are in reach."""
+    job = tmp_path / "here" / "part" / "job.toml"
+    job.parent.mkdir(parents=True)
+    job.write_text('[program]\nfile = "square.ngc"\n')
+    one = square_result()
+    made_from = f"job.toml sha256 {hashlib.sha256(job.read_bytes()).hexdigest()}"
+    inputs = {**one.provenance.inputs, "job": made_from}
+    write_by_hand(replace(one, provenance=replace(one.provenance, inputs=inputs)), tmp_path / "here" / "result")
+    opened = open_path(tmp_path / "here" / "result")
+    assert (opened.root, opened.first) == (tmp_path / "here", "result")
+    # another job of that name is not the one that it was made from
+    job.write_text('[program]\nfile = "round.ngc"\n')
+    opened = open_path(tmp_path / "here" / "result")
+    assert (opened.root, opened.first) == (tmp_path / "here" / "result", ".")
 
 
 EMPTY = pa.table({c: pa.array([], pa.float64()) for c in ("t_s", "s_mm", "x_mm", "y_mm", "z_mm")})

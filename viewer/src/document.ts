@@ -40,6 +40,8 @@ export interface Colouring {
   rows: Buffer;
   points: Buffer;
   breaks: Buffer;
+  /** segments that do not cut; null: not known */
+  air: Buffer | null;
   values: Buffer;
   above: Buffer;
   frames: Buffer | null;

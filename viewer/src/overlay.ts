@@ -1,6 +1,7 @@
 /** What is laid over the 3D view as HTML: the scale of the colours, a scale bar, values under the pointer, messages. */
 
 import { Colouring, Header, MapLegend } from "./document";
+import { AIR, hex } from "./path";
 
 const STYLE = `
 .cv { width: 100%; height: 100%; overflow: hidden; display: flex; flex-direction: column;
@@ -136,7 +137,8 @@ export class Overlay {
   }
 
   private column(header: Header, c: Colouring): void {
-    const head = this.head(c.unit ? `${c.label} [${c.unit}]` : c.label, c.words.slice(0, 12));
+    const air: [string, string][] = c.air ? [["in air", hex(AIR)]] : [];
+    const head = this.head(c.unit ? `${c.label} [${c.unit}]` : c.label, [...c.words.slice(0, 12), ...air]);
     if (c.words.length) return;
     const ramp = this.ramp(c.low, c.high, header.scale);
     if (c.limit === null) return;

@@ -7,6 +7,8 @@ import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeome
 import { Colouring, Document, Header, Path as PathRecord, Rgb } from "./document";
 
 export const ABOVE: Rgb = [200, 30, 30];
+/** of what does not cut, whatever the column */
+export const AIR: Rgb = [128, 138, 150];
 const NONE: Rgb = [150, 156, 165];
 const WIDTH = 2.2, THICK = 5;
 /** of more segments the lines are one pixel wide: they lie next to one another, and cost a twentieth without a GPU */
@@ -14,6 +16,10 @@ const MANY = 8000;
 
 export function rgb(hex: string): Rgb {
   return [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16)) as Rgb;
+}
+
+export function hex(colour: Rgb): string {
+  return `#${colour.map((v) => v.toString(16).padStart(2, "0")).join("")}`;
 }
 
 /** Colour of a share 0 .. 1 of the scale. */
@@ -36,6 +42,9 @@ export function coloured(values: Float32Array, above: Uint8Array | null, c: Colo
     return shade(header.scale, span > 0 ? (v - c.low) / span : 0);
   });
 }
+
+/** How a segment is drawn: one that does not cut hides nothing, one beyond its limit is seen first. */
+type Kind = "air" | "cut" | "beyond";
 
 /** Lines one pixel wide between pairs of places, in the colours of their ends. */
 function thin(place: number[], colour: number[]): { lines: THREE.LineSegments; material: THREE.Material } {
@@ -120,24 +129,27 @@ export class ToolPath {
     this.sets.length = 0;
     if (!doc || !c) return;
     const values = doc.f4(c.values), above = doc.u1(c.above), breaks = doc.u1(c.breaks), p = doc.f4(c.points);
+    const air = c.air ? doc.u1(c.air) : null;
+    const kind = (k: number): Kind => above[k] ? "beyond" : air && air[k] ? "air" : "cut";
     this.values = values;
     this.drawn = p;
     this.drawnRows = doc.u4(c.rows);
     const colours = coloured(values, above, c, header), linear = new THREE.Color();
-    for (const thick of [false, true]) {
+    for (const drawn of ["air", "cut", "beyond"] as Kind[]) {
       const place: number[] = [], colour: number[] = [];
       for (let k = 1; k < values.length; k++) {
-        if (breaks[k] || Boolean(above[k]) !== thick) continue;
-        linear.setRGB(colours[k][0] / 255, colours[k][1] / 255, colours[k][2] / 255, THREE.SRGBColorSpace);
+        if (breaks[k] || kind(k) !== drawn) continue;
+        const [r, g, b] = drawn === "air" ? AIR : colours[k];
+        linear.setRGB(r / 255, g / 255, b / 255, THREE.SRGBColorSpace);
         for (let n = 3 * k - 3; n < 3 * k + 3; n++) place.push(p[n]);
         colour.push(linear.r, linear.g, linear.b, linear.r, linear.g, linear.b);
       }
       if (!place.length) continue;
-      if (!thick && place.length > 6 * MANY) { this.sets.push(thin(place, colour)); continue; }
+      if (drawn === "air" || (drawn === "cut" && place.length > 6 * MANY)) { this.sets.push(thin(place, colour)); continue; }
       const geometry = new LineSegmentsGeometry();
       geometry.setPositions(place);
       geometry.setColors(colour);
-      const material = new LineMaterial({ linewidth: thick ? THICK : WIDTH, vertexColors: true, toneMapped: false });
+      const material = new LineMaterial({ linewidth: drawn === "beyond" ? THICK : WIDTH, vertexColors: true, toneMapped: false });
       const lines = new LineSegments2(geometry, material);
       this.sets.push({ lines, material });
     }

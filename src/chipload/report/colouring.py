@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.report.view import Colouring, ViewPath
 from chipload.result import COLUMNS, LimitCheck, Track
+from chipload.result.coverage import CUTTING
 from chipload.result.thinning import thin_rows
 from chipload.simulation.removal_mesh import RemovalMesh
 
@@ -31,6 +32,21 @@ FIRST = (
     "tool_clearance_mm",
     "feed_mm_min",
 )
+
+
+def rows_in_air(column: Callable[[str], Floats | None]) -> Bools | None:
+    """(n,) rows that do not cut, by the first column of loads that the history has; None: it has none.
+
+    ``column`` (n,) of the history by its name; None: there is none.
+
+    >>> rows_in_air({"force_n": np.array([0.0, 80.0])}.get).tolist()
+    [True, False]
+    """
+    for name in CUTTING:
+        values = column(name)
+        if values is not None:
+            return np.asarray(~(np.nan_to_num(values) > 0.0))
+    return None
 
 
 def rows_beyond(values: Floats, check: LimitCheck) -> Bools:

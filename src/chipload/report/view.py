@@ -42,7 +42,8 @@ TYPES = {"f4": "<f4", "u4": "<u4", "u2": "<u2", "u1": "u1"}
 @dataclass(frozen=True, eq=False)
 class ViewPath:
     """Where the tool stands at each row: ``place`` (n, 3) [mm], ``axis`` (n, 3), time ``t`` [s], path ``s`` [mm],
-    number of the ``tool``, ``line`` of the text (None: not known), whether the row is ``apart`` from the one before.
+    number of the ``tool``, ``line`` of the text (None: not known), whether the row is ``apart`` from the one before,
+    whether it is in ``air`` (None: not known).
     """
 
     place: Floats
@@ -52,6 +53,7 @@ class ViewPath:
     tool: Ints
     line: Ints | None
     apart: Bools
+    air: Bools | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,6 +300,7 @@ def _colour_values(c: Colouring, path: ViewPath, out: Buffers) -> dict[str, Any]
         "rows": out.put(c.rows, "u4"),
         "points": out.put(path.place[c.rows], "f4"),
         "breaks": out.put(_breaks(path.apart, c.rows), "u1"),
+        "air": None if path.air is None else out.put(path.air[c.rows], "u1"),
         "values": out.put(c.values, "f4"),
         "above": out.put(c.above, "u1"),
         "frames": None if c.frames is None else out.put(c.frames, "f4"),

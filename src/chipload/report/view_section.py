@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding
 from chipload.report.bodies import SceneBody, bodies_note, scene_bodies
-from chipload.report.colouring import FIRST, bounds_of, colouring_of, lowest_limit
+from chipload.report.colouring import FIRST, bounds_of, colouring_of, lowest_limit, rows_in_air
 from chipload.report.marks import marks_of
 from chipload.report.operating import COLUMNS as OPERATING
 from chipload.report.operating import operating_points
@@ -23,6 +23,7 @@ from chipload.report.removal import AXIS, PLACE, ShownStocks, axes_of_rows, brea
 from chipload.report.shown_maps import shown_maps
 from chipload.report.view import Colouring, ViewPath, ViewScene, pointer_parts, scene_document
 from chipload.result import LimitCheck, Result, Track
+from chipload.result.coverage import CUTTING
 from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.removal_mesh import RemovalMesh
 
@@ -138,7 +139,8 @@ def _columns(track: Track) -> dict[str, NDArray[Any]]:
     wanted = {*PLACE, *AXIS, "t_s", "s_mm", "tool", "line", *FIRST, *OPERATING}
     parts: dict[str, list[NDArray[Any]]] = {}
     for block in track.blocks():
-        for name in wanted & set(block):
+        # one column tells where it cuts
+        for name in wanted.union(c for c in CUTTING[:1] if c in block) & set(block):
             parts.setdefault(name, []).append(np.asarray(block[name]))
     return {name: np.concatenate(parts.pop(name)) for name in list(parts)}
 
@@ -153,7 +155,13 @@ def _path(columns: dict[str, NDArray[Any]]) -> ViewPath:
     rising = [np.maximum.accumulate(np.nan_to_num(columns.get(c, np.arange(n)).astype(float))) for c in ("t_s", "s_mm")]
     tool = columns["tool"].astype(np.int64) if "tool" in columns else np.zeros(n, dtype=np.int64)
     line = columns["line"].astype(np.int64) if "line" in columns else None
-    return ViewPath(place, axis, rising[0], rising[1], np.maximum(tool, 0), line, breaks(place, columns.get("s_mm")))
+
+    def known(name: str) -> NDArray[np.float64] | None:
+        values = columns[name].astype(np.float64) if name in columns else None
+        return values if values is not None and np.isfinite(values).any() else None
+
+    apart = breaks(place, columns.get("s_mm"))
+    return ViewPath(place, axis, rising[0], rising[1], np.maximum(tool, 0), line, apart, rows_in_air(known))
 
 
 def _colours(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
-from chipload.errors import InputError
+from chipload.errors import ChiploadError, InputError
 from chipload.files import read_regular
 from chipload.jobs import CAPABILITIES
 from chipload.result import Verdict, read_summary
@@ -47,7 +47,8 @@ class FolderEntry:
 
 
 def open_path(path: str | Path) -> OpenedFolder:
-    """The folder of a result or of a job, or a folder that holds them.
+    """The folder of a result or of a job, or a folder that holds them. A result is opened with the folder that it lies
+    in where its job is there too: its program is shown, and the job can be changed and run again.
 
     Raises
     ------
@@ -61,10 +62,21 @@ def open_path(path: str | Path) -> OpenedFolder:
         err = err if isinstance(err, OSError) else OSError(0, str(err))
         raise InputError(f"{path}: cannot be opened: {err.strerror}: name a result folder, a job or a folder") from None
     if real.is_dir():
-        return OpenedFolder(real, "." if is_result(real) else None)
+        return _with_its_job(real) if is_result(real) else OpenedFolder(real, None)
     if not is_job(real):
         raise InputError(f"{path}: is not a job: name a job file (TOML), a result folder or a folder that holds them")
     return OpenedFolder(real.parent, real.name)
+
+
+def _with_its_job(result: Path) -> OpenedFolder:
+    """A result, in the folder that it lies in where the job that it was made from is found there, else alone."""
+    alone, above = OpenedFolder(result, "."), result.parent
+    try:
+        job = read_summary(result).provenance.inputs.get("job")
+        found = job is not None and above != above.parent and find_by_hash(above, job) is not None
+    except (ChiploadError, OSError):
+        return alone
+    return OpenedFolder(above, result.name) if found else alone
 
 
 def resolve_name(root: Path, name: str) -> Path:

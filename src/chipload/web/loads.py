@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.report.colouring import rows_in_air
 from chipload.web.result import PageResult, PageTrack, TextColumn
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-#: a step cuts where the first of these columns that the history has is above 0
-CUTS = ("chip_volume_mm3", "engagement_deg", "force_n", "force_xy_n", "torque_nm", "torque_mean_nm", "depth_mm")
 #: loads that are listed, where the history has them: at most so many
 LOADS = (
     "force_n", "force_xy_n", "force_normal_n", "torque_nm", "torque_mean_nm", "power_w", "deflection_um",
@@ -68,12 +67,9 @@ class LineLoad:
 
 
 def cutting_rows(result: PageResult, track: PageTrack) -> Bools | None:
-    """(n,) rows in material; None: the history has no such column."""
-    for column in CUTS:
-        values = _numbers(result, track, column)
-        if values is not None:
-            return np.asarray(np.nan_to_num(values) > 0.0)
-    return None
+    """(n,) rows in material; None: the history does not tell."""
+    air = rows_in_air(lambda column: _numbers(result, track, column))
+    return None if air is None else ~air
 
 
 def shown_loads(result: PageResult, track: PageTrack) -> list[str]:

@@ -23,6 +23,7 @@ from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.removal_mesh import RemovalMesh
 from chipload.web.checks import row_of
 from chipload.web.cutters import cutters_of
+from chipload.web.loads import cutting_rows
 from chipload.web.result import SCENE, PageResult, PageTrack, TextColumn
 
 #: largest scene [bytes] that the page shows
@@ -110,10 +111,12 @@ def operating_of(result: PageResult, track: PageTrack) -> OperatingPoints | None
     return operating_points(result.result, track.own, numbers)
 
 
-def view_path(track: PageTrack) -> ViewPath:
-    """Where the tool of a track stands."""
+def view_path(result: PageResult, track: PageTrack) -> ViewPath:
+    """Where the tool of a track stands, and where it cuts."""
     tool = track.tool if track.tool is not None else np.zeros(len(track), dtype=np.int64)
-    return ViewPath(track.place, track.axis, track.t, track.s, np.maximum(tool, 0), track.line, track.apart)
+    cut = cutting_rows(result, track)
+    air = None if cut is None else ~cut
+    return ViewPath(track.place, track.axis, track.t, track.s, np.maximum(tool, 0), track.line, track.apart, air)
 
 
 def page_scene(
@@ -148,7 +151,7 @@ def page_scene(
     maps = shown_maps(result.result, track.own, bounds_of(track.own))
     marks = marks_of(result.result, track.own, row, track.place)
     scene = ViewScene(
-        result.result.title, solids, removal, view_path(track), parts, marks,
+        result.result.title, solids, removal, view_path(result, track), parts, marks,
         colour_column(result, track, column, removal, span), samples=samples,
         bounds=bounds_of(track.own), operating=operating_of(result, track),
         maps=maps,
@@ -169,7 +172,7 @@ def colour_column(
 ) -> Colouring:
     """The colours of a column of a track; ``span``: ends of their scale, None: the column's own."""
     values: NDArray[np.float64] | TextColumn = result.column(track, column)
-    path = view_path(track)
+    path = view_path(result, track)
     if column == "tool" and not isinstance(values, TextColumn):
         numbers, codes = np.unique(values, return_inverse=True)
         values = TextColumn(codes.astype(np.int64), tuple(f"T{number:.0f}" for number in numbers))

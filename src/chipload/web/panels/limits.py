@@ -65,7 +65,8 @@ def limit_table(track: PageTrack) -> str:
         out.append(
             f"<tr{go}><td>{escape(name)}</td><td class=n>{worst}</td>"
             f"<td class=n>{least}{number_text(c.limit, 6)} {unit}</td>"
-            f'<td>{bar}</td><td class=cl-{state}>{c.state.value}</td><td class=w title="{where}">{where}</td></tr>'
+            f"<td>{bar}</td><td class=cl-{state}>{c.state.value}</td>"
+            f'<td class=w title="{where}"><div>{where}</div></td></tr>'
         )
     head = (
         "<tr><th>limit</th><th class=n>worst</th><th class=n>limit</th><th>share</th><th>state</th><th>where</th></tr>"

@@ -248,7 +248,7 @@ class ScenePanel:
 
         def document(side: Side, own: PageScene) -> bytes:
             made = colour_column(side.result, side.track, column, own.removal, span)
-            return colouring_document(made, view_path(side.track))
+            return colouring_document(made, view_path(side.result, side.track))
 
         for view, side, own in shown[:views]:
             data = await asyncio.to_thread(document, side, own)
