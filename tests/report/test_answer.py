@@ -57,6 +57,10 @@ def test_where_nothing_exceeds_the_critical_limit_is_marked() -> None:
     track = replace(result.tracks[0], limits=(FORCE,), findings=())
     (mark,) = marks_of(result, track, lambda item: item.row, place)
     assert (mark.row, mark.kind, mark.text) == (3, CRITICAL, "force 400 of 500 N, line 7")
+    # what is nearest to its limit has no place: the next that has one is marked
+    nowhere = LimitCheck("scallop_mm", 0.1, 0.099, Verdict.HOLDS, resolution_error=0.0)
+    (mark,) = marks_of(result, replace(track, limits=(nowhere, FORCE)), lambda item: item.row, place)
+    assert mark.text == "force 400 of 500 N, line 7"
     over = replace(FORCE, worst=600.0, state=Verdict.EXCEEDS)
     assert [m.kind for m in marks_of(result, replace(track, limits=(over,)), lambda item: item.row, place)] == ["limit"]
 

@@ -19,6 +19,7 @@ from chipload.errors import Finding, InputError
 from chipload.jobs.contour.figures import presentation_of
 from chipload.jobs.contour.result import result_of
 from chipload.program.apt.reader import read_apt
+from chipload.report.answer import critical_html
 from chipload.report.bodies import scene_bodies
 from chipload.report.colouring import POINTS, WORDS, drawn_rows
 from chipload.report.folder import write_result
@@ -256,6 +257,21 @@ def test_two_tracks_keep_their_own_time_and_the_one_in_use_comes_first(tmp_path:
     assert bound_of(r, other, "force_n").above.sum() == (FORCE > 800.0).sum()
     assert findings(r, other)[0].text == "line 8: the path leaves the workpiece"
     assert r.result.verdict is Verdict.HOLDS
+
+
+def test_of_several_programs_the_one_of_the_critical_limit_is_shown_first_and_named(tmp_path: Path) -> None:
+    """Two setups in use: the second is nearer to its limit."""
+    first, second = two_variants().tracks
+    near = replace(first.limits[0], worst=790.0, track="setup 2")
+    tracks = (replace(first, name="setup 1"), replace(second, name="setup 2", in_use=True, limits=(near,), findings=()))
+    write_by_hand(replace(two_variants(), tracks=tracks), tmp_path / "two")
+    r = open_result(tmp_path, "two")
+    assert (r.first, r.result.critical_program) == (1, "setup 2")
+    assert ">setup 2: force 790 of 800 N<" in critical_html(r.result)
+    assert "setup 2: force 790 of 800 N" in r.result.message
+    write_by_hand(two_variants(), tmp_path / "one")
+    r = open_result(tmp_path, "one")
+    assert (r.first, r.result.critical_program) == (0, "")
 
 
 def test_an_arc_and_a_path_that_comes_back_are_followed() -> None:

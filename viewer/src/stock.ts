@@ -22,6 +22,23 @@ function unrolled(doc: Document, removal: Removal): Uint16Array {
   return out;
 }
 
+/** (4q, 4) on which side of its quad each corner lies, along X, Y and Z. Where a level or upright quad ends within the side of another,
+    specks of what is behind show between the two, unless each is drawn half a pixel larger; the quads of other faces meet at corners. */
+function outward(position: Float32Array): Int8Array {
+  const out = new Int8Array(position.length / 3 * 4), off = [0, 0, 0, 0];
+  for (let q = 0; q < position.length; q += 12) {
+    let flat = false;
+    for (let i = 0; i < 3; i++) {
+      const middle = (position[q + i] + position[q + 3 + i] + position[q + 6 + i] + position[q + 9 + i]) / 4;
+      for (let c = 0; c < 4; c++) off[c] = position[q + 3 * c + i] - middle;
+      if (off.every((v) => Math.abs(v) < 1e-5 * (1 + Math.abs(middle)))) flat = true;
+      else for (let c = 0; c < 4; c++) out[4 * (q / 3 + c) + i] = Math.sign(off[c]) * 127;
+    }
+    if (!flat) out.fill(0, 4 * q / 3, 4 * q / 3 + 16);
+  }
+  return out;
+}
+
 export class Stock {
   readonly mesh: THREE.Mesh;
   readonly group = new THREE.Group();
@@ -33,7 +50,7 @@ export class Stock {
   private readonly low: THREE.Vector3;
   private readonly uniforms = {
     raw: { value: RAW }, cap: { value: CAP }, shades: { value: null as THREE.Texture | null },
-    size: { value: 1 }, glass: { value: 0 }, cut: { value: 0 },
+    size: { value: 1 }, glass: { value: 0 }, cut: { value: 0 }, grown: { value: 0 },
   };
 
   constructor(doc: Document, removal: Removal) {
@@ -50,6 +67,7 @@ export class Stock {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
     geometry.setAttribute("birth", new THREE.BufferAttribute(birth, 1));
+    geometry.setAttribute("outward", new THREE.BufferAttribute(outward(position), 4, true));
     geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(count * 6), 1).setUsage(THREE.DynamicDrawUsage));
     geometry.computeBoundingSphere();
     const material = new THREE.MeshStandardMaterial({
@@ -58,6 +76,7 @@ export class Stock {
     material.onBeforeCompile = (shader) => this.dress(shader);
     this.mesh = new THREE.Mesh(geometry, material);
     this.mesh.renderOrder = 2;
+    this.mesh.onBeforeRender = (renderer, _, camera) => this.grow(renderer, camera as THREE.OrthographicCamera);
     this.group.add(this.mesh);
     this.shade(null);
     this.at(0);
@@ -136,10 +155,17 @@ export class Stock {
     return { volume: six / 6, triangles };
   }
 
+  /** Draw each quad half a pixel larger to each side; as glass not, where it would show twice. */
+  private grow(renderer: THREE.WebGLRenderer, camera: THREE.OrthographicCamera): void {
+    const high = renderer.getDrawingBufferSize(new THREE.Vector2()).y;
+    this.uniforms.grown.value = this.uniforms.glass.value ? 0 : 0.5 * (camera.top - camera.bottom) / camera.zoom / high;
+  }
+
   private dress(shader: THREE.WebGLProgramParametersWithUniforms): void {
     Object.assign(shader.uniforms, this.uniforms);
     shader.vertexShader = shader.vertexShader
-      .replace("#include <common>", "#include <common>\nattribute float birth; varying float born;")
+      .replace("#include <common>", "#include <common>\nattribute float birth; attribute vec4 outward; uniform float grown; varying float born;")
+      .replace("#include <begin_vertex>", "#include <begin_vertex>\ntransformed += outward.xyz * grown;")
       .replace("#include <project_vertex>", "#include <project_vertex>\nborn = birth;");
     shader.fragmentShader = shader.fragmentShader
       .replace("#include <common>", `#include <common>

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from html import escape
 
 from chipload.number_text import percent_text
-from chipload.result import LimitCheck, Verdict
+from chipload.result import LimitCheck, Result, Verdict
 
 #: class of a bar by the state of its limit
 BARS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
@@ -73,10 +73,11 @@ def bar_html(check: LimitCheck) -> str:
     )
 
 
-def answer_html(check: LimitCheck | None, row: int | None = None) -> str:
+def answer_html(check: LimitCheck | None, row: int | None = None, program: str = "") -> str:
     """The critical limit as HTML in the words of the message: value, bar, margin, line and place; empty: there is none.
 
-    ``row``: of the history to which a click on the place leads; None: it leads nowhere.
+    ``row``: of the history to which a click on the place leads; None: it leads nowhere. ``program``: of several, the
+    one that the limit is of.
     """
     if check is None:
         return ""
@@ -84,5 +85,11 @@ def answer_html(check: LimitCheck | None, row: int | None = None) -> str:
     margin = f"<span>{escape(check.margin_text)}</span>" if within else ""
     go = f' data-row="{row}" class="cl-go" title="go there" tabindex="0" role="button"' if row is not None else ""
     where = f"<span{go}>{escape(check.where)}</span>" if check.where else ""
-    value = f'<span class="value">{escape(check.value_text)}</span>'
+    of = f"{program}: " if program else ""
+    value = f'<span class="value">{escape(of + check.value_text)}</span>'
     return f'<div class="answer">{value}{bar_html(check)}{margin}{where}</div>'
+
+
+def critical_html(result: Result) -> str:
+    """The critical limit of a result as HTML, see :func:`answer_html`."""
+    return answer_html(result.critical, program=result.critical_program)

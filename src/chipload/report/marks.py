@@ -25,7 +25,7 @@ def marks_of(
     result: Result, track: Track, row: Callable[[LimitCheck | Finding], int | None], place: NDArray[np.float64]
 ) -> tuple[ViewMark, ...]:
     """The marks of a track: collisions, the deepest first, then limits, the worst first; where there is none, the place
-    of the limit with the least margin.
+    of the limit with the least margin that has one.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def marks_of(
             touched.append(_collision(result, track, f, k, place))
     touched.sort(key=lambda m: -m.depth_mm)
     if not touched and not out:
-        critical = critical_check(track.limits)
+        critical = critical_check(check for check in track.limits if row(check) is not None)
         k = None if critical is None else row(critical)
         if critical is not None and k is not None:
             out.append(ViewMark(k, _place_of(place[k]), _critical_text(critical), CRITICAL))

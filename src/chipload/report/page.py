@@ -15,7 +15,7 @@ import plotly.graph_objects as go
 
 from chipload.errors import Finding, Severity
 from chipload.number_text import number_text, percent_text
-from chipload.report.answer import answer_html
+from chipload.report.answer import critical_html
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import definitions, fold_sections, frame_page, heading_lines, items, table
 from chipload.report.view import viewer_script
@@ -59,7 +59,7 @@ def page_bytes(result: Result, presentation: Presentation, view: Sequence[str] =
         definitions(asdict(result.provenance)),
     ]
     body = [
-        *heading_lines(result.title, BANNERS[verdict], verdict.value, result.first_lines, answer_html(result.critical)),
+        *heading_lines(result.title, BANNERS[verdict], verdict.value, result.first_lines, critical_html(result)),
         *changes_list(result),
         *findings_table("Findings", tuple(f for f in findings if f.severity is not Severity.NOTE)),
         "<h2>Not checked</h2>",

@@ -10,7 +10,7 @@ from html import escape
 
 from chipload.errors import InputError
 from chipload.number_text import number_text
-from chipload.report.answer import answer_html
+from chipload.report.answer import critical_html
 from chipload.report.page import BANNERS, limits_table
 from chipload.report.pdf import Block, SheetLine, SheetTable, one_page
 from chipload.report.sheet import definitions, heading_lines, items, style, table
@@ -41,7 +41,7 @@ def setup_sheet(result: Result) -> bytes:
     machine = definitions({"machine": result.provenance.machine, "materials": ", ".join(result.provenance.materials)})
     tools = [definitions({"tools": numbers, "motions [mm]": box}) for numbers, box in _travel(result)]
     body = [
-        *heading_lines(result.title, BANNERS[verdict], verdict.value, result.first_lines, answer_html(result.critical)),
+        *heading_lines(result.title, BANNERS[verdict], verdict.value, result.first_lines, critical_html(result)),
         machine,
         "<h2>Programs</h2>",
         table(["program", "files", "time [min]", "verdict"], rows, numbers=(2,)),

@@ -160,6 +160,14 @@ class Result:
         return critical_check(self.limits)
 
     @cached_property
+    def critical_program(self) -> str:
+        """The name of the track in use that the critical check is of; empty: one alone is in use, or no check has a
+        margin.
+        """
+        own = (track.name for track in self.in_use if any(check is self.critical for check in track.limits))
+        return next(own, "") if len(self.in_use) > 1 else ""
+
+    @cached_property
     def open_lines(self) -> tuple[str, ...]:
         """What the verdict leaves open: what exceeds or is not proven, what the limits do not cover, what is not
         checked.

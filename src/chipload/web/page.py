@@ -114,7 +114,7 @@ class Page:
             ui.page_title(f"{result.result.verdict.value}: {title} - chipload")
             self.name.set_text(self._folder_name(name))
             options = {k: t.title for k, t in enumerate(result.tracks)}
-            self.tracks.set_options(options, value=0)
+            self.tracks.set_options(options, value=result.first)
             self.tracks.set_visibility(len(options) > 1)
             self.report.set_visibility(True)
             self.report.props(f'href="/report?name={quote(name)}"')

@@ -109,6 +109,13 @@ class PageResult:
     count: int
     _cache: dict[str, Floats | TextColumn] = field(default_factory=dict)
 
+    @property
+    def first(self) -> int:
+        """Number of the track that is shown first: that of the critical limit."""
+        critical = self.result.critical
+        own = (k for k, track in enumerate(self.tracks) if any(check is critical for check in track.own.limits))
+        return next(own, 0)
+
     def file(self, name: str) -> Path:
         """A file of the result.
 

@@ -123,7 +123,7 @@ class ResultView:
             self.where = ui.label("").classes("cl-where").mark("where")
 
     async def open(self, result: PageResult) -> None:
-        """Show a result from the beginning of its first track."""
+        """Show a result at the place of its critical limit."""
         async with self.turn:
             await self._open(result)
 
@@ -244,7 +244,7 @@ class ResultView:
     async def _open(self, result: PageResult) -> None:
         self.pause()
         await self._stop_comparing()
-        track = result.tracks[0]
+        track = result.tracks[result.first]
         self.result, self.track = result, track
         verdict, message = result.result.verdict, result.result.message
         for state in VERDICTS.values():
@@ -252,9 +252,10 @@ class ResultView:
         self.verdict.classes(f"cl-{VERDICTS[verdict]}")
         self.word.set_text(verdict.value)
         critical = result.result.critical
-        own = next((t for t in result.tracks if critical is not None and critical in t.own.limits), None)
-        self.critical = None if own is None or critical is None else (own, row_of(own, critical))
-        self.answer.set_content(answer_html(critical, None if self.critical is None else self.critical[1]))
+        shown = critical is not None and any(check is critical for check in track.own.limits)
+        self.critical = (track, row_of(track, critical)) if shown and critical is not None else None
+        row = None if self.critical is None else self.critical[1]
+        self.answer.set_content(answer_html(critical, row, result.result.critical_program))
         self.more.set_text(" ".join(result.result.open_lines) or ALL_CHECKED)
         self._show_changes(await asyncio.to_thread(lambda: result.result.changes))
         self.message.set_text(message)

@@ -7,7 +7,7 @@ from html import escape
 from nicegui import ui
 
 from chipload.number_text import number_text
-from chipload.report.answer import answer_html, bar_html
+from chipload.report.answer import bar_html, critical_html
 from chipload.report.shape_figure import shape_figure, shape_note
 from chipload.result import Result
 from chipload.web.result_view import VERDICTS
@@ -53,7 +53,7 @@ class ShapePanel:
             with ui.element("div").classes(f"cl-verdict cl-open cl-{VERDICTS[result.verdict]}"):
                 with ui.element("div").classes("cl-answer"):
                     ui.label(result.verdict.value).classes("cl-word").mark("verdict")
-                    ui.html(answer_html(result.critical), sanitize=True).mark("answer")
+                    ui.html(critical_html(result), sanitize=True).mark("answer")
                 ui.label(result.first_lines[0]).classes("cl-message").props("role=status")
                 for line in result.first_lines[1:]:
                     ui.label(line)
