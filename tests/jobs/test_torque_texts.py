@@ -99,6 +99,31 @@ def test_the_released_text_is_the_simulated_one(done, monkeypatch) -> None:
             assert program_files(outcome, result)[name].startswith(b"(NOT VERIFIED: its text is not the one")
 
 
+def test_each_step_names_the_line_of_the_text_that_moves_it(done) -> None:
+    """A turn downwards, one level: the line of a step follows from its height and its side."""
+    text = done.outcome.job.written.text.splitlines()
+    arcs = [k for k, line in enumerate(text, 1) if " I" in line]
+    first, last = (next(k for k, line in enumerate(text, 1) if line == word) for word in ("G1 Y0 F1800", "G1 Y-9"))
+    assert len(arcs) == 4
+    for track in done.result.tracks:
+        c = next(iter(track.blocks()))
+        moves = np.flatnonzero(c["override_state"] != "rapid")[1:]
+        if track.name.startswith("model_not_derated,"):  # its feeds are in a text of its own
+            assert not c["line"].any()
+            continue
+        x, y, z, line = (np.asarray(c[name])[moves] for name in ("x_mm", "y_mm", "z_mm", "line"))
+        lead, level = x > 17.749, z < -1.9999
+        wanted = np.select(
+            [lead & (y > 0.0), lead & (y < -0.1) & level, z > -1.5 + 1e-9, ~level, y < 0.0],
+            [first, last, arcs[0], arcs[1], arcs[2]], arcs[3],
+        )  # fmt: skip
+        # where one motion ends and the next begins either may be named
+        assert (line == wanted).mean() > 0.98, track.name
+        assert set(line) == {first, *arcs, last}
+    assert done.result.critical.line in arcs
+    assert f"in line {done.result.critical.line} at (" in done.result.message
+
+
 def test_a_changed_text_does_not_hold(job, monkeypatch) -> None:
     writes(monkeypatch, CHANGES["feed doubled"])
     found = chipload.run_job(job.job.path)

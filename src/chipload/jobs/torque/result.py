@@ -45,6 +45,8 @@ from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
 #: the limit on the excess of the torque over what is allowable
 OVER = "torque_over_percent"
+#: a step that goes so little beyond a motion ends with it [mm]
+SAME_MM = 1e-9
 #: columns whose error is that of the force, of the force and the compliance of the workpiece, of the mean torque
 WITH_FORCE = ("force_n", "deflection_share", "cutter_stress_mpa")
 WITH_PART = ("form_error_um", "stress_mpa", "strength_share", "deflection_um", "deflection_workpiece_um")
@@ -130,8 +132,9 @@ def _is_machine_loop(case: ControllerCase) -> bool:
 
 def _track(outcome: TorqueResult, case: ControllerCase, name: str) -> Track:
     run, track = case.runs[name], track_name(case, name)
-    columns = _columns(outcome, run)
-    used = name == HELD and case is outcome.control.cases[-1]
+    last = case is outcome.control.cases[-1]
+    columns = _columns(outcome, run, name == MODEL_FULL and last)
+    used = name == HELD and last
     return Track(
         name=track,
         kind=TrackKind.CONTROLLER,
@@ -161,8 +164,11 @@ def _programs(outcome: TorqueResult, case: ControllerCase, name: str) -> tuple[s
     return (files[name](outcome.job.machine),) if case is outcome.control.cases[-1] and name in files else ()
 
 
-def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
-    """(n,) columns of the whole program with a controller: rapids, a row for each step of the controller, rapids."""
+def _columns(outcome: TorqueResult, run: ControllerRun, feeds_written: bool) -> Columns:
+    """(n,) columns of the whole program with a controller: rapids, a row for each step of the controller, rapids.
+
+    ``feeds_written``: its feeds are written into a program of its own, whose lines are others, and are left open.
+    """
     found, written, own = _controller_columns(outcome, run), outcome.job.written, outcome.job.written.controlled
     rows = list(range(own.start - 1)), list(range(own.stop, len(written.program) if run.outcome.finished else 0))
     before, after = (_rapids(outcome, found, r, end) for r, end in zip(rows, (0, -1), strict=True))
@@ -172,7 +178,13 @@ def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
     for name, values, sums in (("t_s", run.outcome.t, seconds), ("s_mm", run.outcome.s, far)):
         behind = sums[first] + values[-1] + sums[rows[1]] - sums[own.stop - 1]
         out[name] = np.concatenate([sums[rows[0]], sums[first] + values, behind])
-    return out | {"duration_s": np.diff(out["t_s"], prepend=0.0)}
+    out |= {"duration_s": np.diff(out["t_s"], prepend=0.0)}
+    # the row of the program in which each step ends; all but the schedule of feeds run the one that takes the override
+    ends = np.cumsum(lengths(written.program)[own])
+    steps = own.start + np.minimum(np.searchsorted(ends, run.outcome.s - SAME_MM), len(ends) - 1)
+    lines = written.program.line[np.concatenate([rows[0], steps, rows[1]]).astype(np.int64)]
+    known = written.whole is not None and not feeds_written
+    return {"line": np.where(known, lines, 0), **out}
 
 
 def _rapids(outcome: TorqueResult, found: Columns, rows: list[int], end: int) -> Columns:
