@@ -156,12 +156,12 @@ def _path(columns: dict[str, NDArray[Any]]) -> ViewPath:
     tool = columns["tool"].astype(np.int64) if "tool" in columns else np.zeros(n, dtype=np.int64)
     line = columns["line"].astype(np.int64) if "line" in columns else None
 
-    def known(name: str) -> NDArray[np.float64] | None:
+    def numbers(name: str) -> NDArray[np.float64] | None:
         values = columns[name].astype(np.float64) if name in columns else None
         return values if values is not None and np.isfinite(values).any() else None
 
     apart = breaks(place, columns.get("s_mm"))
-    return ViewPath(place, axis, rising[0], rising[1], np.maximum(tool, 0), line, apart, rows_in_air(known))
+    return ViewPath(place, axis, rising[0], rising[1], np.maximum(tool, 0), line, apart, rows_in_air(numbers))
 
 
 def _colours(

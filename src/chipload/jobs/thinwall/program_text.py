@@ -94,15 +94,15 @@ def with_lines_of_text(one: Variant, reading: ProgramReading | None) -> Variant:
         there = program.line[np.minimum(row, len(program) - 1)] == line
         return np.where(there, lines[np.minimum(row, len(program) - 1)], 0)
 
-    def moved(line: int) -> int:
+    def line_in_text(line: int) -> int:
         return int(of_text(np.array([line]))[0]) if line else 0
 
-    touched = tuple(replace(c, line=moved(c.line)) for c in one.shape.collisions)
+    touched = tuple(replace(c, line=line_in_text(c.line)) for c in one.shape.collisions)
     return replace(
         one,
         columns={**one.columns, "line": of_text(np.asarray(one.columns["line"], dtype=np.int64))},
         shape=replace(one.shape, collisions=touched),
-        beyond=tuple(replace(f, line=moved(f.line)) for f in one.beyond),
+        beyond=tuple(replace(f, line=line_in_text(f.line)) for f in one.beyond),
     )
 
 
