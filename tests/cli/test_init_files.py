@@ -26,7 +26,7 @@ def test_a_program_whose_axes_no_machine_has(tmp_path: Path) -> None:
 
 def test_a_table_of_numbers_is_no_program(tmp_path: Path) -> None:
     path = tmp_path / "points.txt"
-    path.write_text("51.2 30.1 2.0\n52.2 30.1 2.0\n")
+    path.write_text("51.2 30.1 2.0 4.5 5.0\n52.2 30.1 2.0 4.5 5.0\n")
     code, _, said = call("init", path, tmp_path / "job")
     assert code == 2
     assert said == (
@@ -146,6 +146,27 @@ def test_a_camotics_project_whose_script_has_no_nc_text(tmp_path: Path) -> None:
     (tmp_path / "sign.camotics").write_text(json.dumps({"tools": {"1": tool}, "files": ["letters.nc"]}))
     _, _, err = call("init", tmp_path / "sign.camotics", tmp_path / "job")
     assert err.rstrip().endswith("(letters.nc): put it next to the project")
+
+
+def test_a_cloud_of_points_is_a_thin_wall(tmp_path: Path) -> None:
+    """Three ellipses of 30 by 4 mm in any order, in metres, numbered; points on no levels are refused."""
+    from math import cos, pi, sin
+
+    points = [
+        (15e-3 * cos(t), 2e-3 * sin(t), 20e-3 * k) for t in (2 * pi * i / 60 for i in range(60)) for k in range(3)
+    ]
+    write = "".join(f"{i}\t{x:.6f}\t{y:.6f}\t{z:.6f}\n" for i, (x, y, z) in enumerate(points, 7))
+    (tmp_path / "cloud.txt").write_text(write)
+    code, _, said = call("init", tmp_path / "cloud.txt", tmp_path / "job")
+    assert code == 0, said
+    text = (tmp_path / "job" / "job.toml").read_text()
+    wall = tomllib.loads(text)["wall"]
+    assert (wall["unit"], wall["columns"]) == ("m", "X Y Z")
+    assert "# 3 sections" in text
+    (tmp_path / "cloud.txt").write_text("".join(f"{x} {y} {z + 2 * x:.6f}\n" for x, y, z in points))
+    code, _, said = call("init", tmp_path / "cloud.txt", tmp_path / "other")
+    assert code == 2
+    assert "of a cloud, the points of each must have one x, y, z or distance from z" in said
 
 
 def test_sections_are_a_thin_wall(tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ u in 0..1 runs along a section from its leading to its trailing edge, v from the
 Formats: tables of three columns, one section per file, whose first line names the columns `X R*THETA R`,
 `X R THETA_DEG` or `X Y Z` (NASA's HECC; X of the first two is along the axis); TurboGrid `.curve` and `.crv` with
 columns x y z and sections separated by lines that begin with #, several blades by lines that begin with ##; tables of
-pyturbo-aero with all sections (``section_table.py``). The files do not state a unit, so the caller states it.
+pyturbo-aero with all sections (``section_table.py``); clouds of points X Y Z that lie on levels, in any order, also
+with their number in front (``point_cloud.py``). The files do not state a unit, so the caller states it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.geometry.bspline import BSplinePatch, patch_through
+from chipload.geometry.point_cloud import levels_of_cloud
 from chipload.geometry.section_table import meridian_of_table, sections_of_table
 from chipload.lazy import scipy
 from chipload.units import MM_PER
@@ -37,6 +39,7 @@ _LARGEST_FILE = 20_000_000
 FARTHEST = 1e6
 _LEAST_POINTS = 12
 _EDGE = 0.03  # share of its length: a profile whose first point is this near to an end begins at that edge
+_ACROSS = 1e-3  # difference of z of its edges over the length of a section that lies across the axis
 _OUTER = 0.02  # greatest relative difference of the outer diameter from the stated one
 #: order of the columns x y z that brings the axis of rotation to the last place
 AXES = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}
@@ -64,7 +67,7 @@ def read_sections(
 ) -> tuple[Floats, ...]:
     """Sections of one blade from files in order from hub to shroud.
 
-    A file of TurboGrid or pyturbo-aero may contain all sections.
+    A file of TurboGrid or pyturbo-aero may contain all sections, and so may a cloud of points.
 
     Parameters
     ----------
@@ -175,8 +178,9 @@ def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
     """Both sides of a blade through its sections.
 
     Each section is interpolated over its chord length and split at its two most distant points; the leading edge is the
-    one of greater z. A section that begins at an edge is split at its first point. Each half is sampled at ``count``
-    places, closer together at the edges, and the patch interpolates these points.
+    one of greater z, and of a section across the axis the second in the file. A section that begins at an edge is split
+    at its first point. Each half is sampled at ``count`` places, closer together at the edges, and the patch
+    interpolates these points.
 
     Raises
     ------
@@ -233,7 +237,8 @@ def _halves(p: Floats) -> tuple[_Half, _Half]:
         options={"xatol": 1e-9 * s[-1]},
     )  # fmt: skip
     split, end = float(found.x), float(s[-1])
-    if curve(split)[2] >= ring[0, 2]:
+    # of a section across the axis the edge that comes first in the file is the trailing one
+    if curve(split)[2] >= ring[0, 2] - _ACROSS * length:
         return (curve, split, 0.0), (curve, split, end)
     return (curve, 0.0, split), (curve, end, split)
 
@@ -286,7 +291,8 @@ def _sections_of(path: Path, scale: float, columns: str | None, order: tuple[int
         if columns is not None and found != columns:
             raise InputError(f"{path}: columns {found}: must be {columns} as stated")
         if found == "X Y Z":
-            out.append(_finite(p[:, order] * scale, path))
+            p = _finite(p[:, order] * scale, path)
+            out += levels_of_cloud(p) or (p,)
             continue
         if found == "X R*THETA R":
             if (p[:, 2] <= 0.0).any():
@@ -341,11 +347,18 @@ def _blocks(path: Path, first: int = 0, last: int | None = None) -> list[tuple[l
             continue
         if not all(map(math.isfinite, row)):
             raise InputError(f"{path} line {k}: a number is not finite: {line.strip()[:40]!r}")
-        if len(row) not in (2, 3) or (blocks[-1][1] and len(row) != len(blocks[-1][1][0])):
-            remedy = "" if len(row) < 4 else ": write each section to a file of its own, a line X Y Z for each point"
-            raise InputError(f"{path} line {k}: {len(row)} numbers: must be 2 or 3, the same in every line{remedy}")
+        if len(row) not in (2, 3, 4) or (blocks[-1][1] and len(row) != len(blocks[-1][1][0])):
+            raise _wrong_length(path, k, len(row))
+        if len(row) == 4 and row[0] != round(row[0]):
+            raise _wrong_length(path, k, 4)
         blocks[-1][1].append(row)
-    blocks = [b for b in blocks if b[1]]
+    # of four numbers the first is that of the point
+    blocks = [(b[0][-3:], [row[-3:] for row in b[1]]) for b in blocks if b[1]]
     if not blocks:
         raise InputError(f"{path}: no numbers: must be a table of points")
     return blocks
+
+
+def _wrong_length(path: Path, line: int, count: int) -> InputError:
+    remedy = "" if count < 4 else ": write each section to a file of its own, a line X Y Z for each point"
+    return InputError(f"{path} line {line}: {count} numbers: must be 2 or 3, the same in every line{remedy}")

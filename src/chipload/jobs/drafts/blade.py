@@ -24,22 +24,42 @@ from chipload.units import MM_PER
 ENDINGS = (".curve", ".crv")
 #: headings of a table of points
 COLUMNS = ("X R*THETA R", "X R THETA_DEG", "X Y Z")
+#: endings of tables of points
+TABLES = (".txt", ".csv", ".dat", ".xyz", ".asc", ".pts")
 #: a blade is at least so large [mm] in the unit that is guessed
 LEAST_MM = 15.0
+#: diameters of ball noses [mm], and the greatest one over the height of a blade
+BALLS, LOW = (8.0, 6.0, 4.0, 3.0, 2.0), 0.25
 #: how far the patch of a face may leave it [mm], as a thin wall has it
 FIT_MM = 0.001
 _NUMBERED = re.compile(r"^(.*?)(\d+)(\D*)$")
 
 
 def holds_sections(file: Path) -> bool:
-    """Return whether a file holds sections of a blade: by its ending, or by the heading of a table of points."""
+    """Return whether a file holds sections of a blade: by its ending, or as a table of points X Y Z, with or without a
+    heading and the numbers of the points.
+    """
     if file.suffix.lower() in ENDINGS:
         return True
-    if file.suffix.lower() not in (".txt", ".csv", ".dat"):
+    if file.suffix.lower() not in TABLES:
         return False
-    text = read_regular(file, file.name, 100_000_000).decode("utf-8", "replace")
-    lines = [line for line in text.splitlines()[:40] if line.strip() and not line.lstrip().startswith("#")]
-    return bool(lines) and " ".join(lines[0].upper().replace(",", " ").split()) in COLUMNS
+    first = _first_words(file)
+    return " ".join(first) in COLUMNS or _numbers(first) in (3, 4)
+
+
+def _first_words(file: Path) -> list[str]:
+    """The words of the first line that is no comment, in capitals."""
+    text = read_regular(file, file.name, 100_000_000).decode("utf-8-sig", "replace")
+    lines = (line for line in text.splitlines()[:40] if line.strip() and not line.lstrip().startswith("#"))
+    return next(lines, "").upper().replace(",", " ").split()
+
+
+def _numbers(words: list[str]) -> int:
+    """How many numbers a line has; 0 where one of its words is none."""
+    try:
+        return len([float(word) for word in words])
+    except ValueError:
+        return 0
 
 
 def draft_sections(file: Path, folder: Path, machine: str | None = None) -> Draft:
@@ -51,15 +71,20 @@ def draft_sections(file: Path, folder: Path, machine: str | None = None) -> Draf
         The sections cannot be read.
     """
     files = _numbered_files(file)
-    unit = _unit(files)
-    points = read_sections(files, unit)
+    columns = "X Y Z" if file.suffix.lower() not in ENDINGS and _numbers(_first_words(file)) else None
+    unit = _unit(files, columns)
+    points = read_sections(files, unit, columns=columns)
     if len(points) < 2:
-        raise InputError(f"{file.name}: {len(points)} section: must be at least 2, from the clamp to the free edge")
+        remedy = "" if columns is None else ": of a cloud, the points of each must have one x, y, z or distance from z"
+        raise InputError(
+            f"{file.name}: {len(points)} section: must be at least 2, from the clamp to the free edge{remedy}"
+        )
     size, height = _sizes(points)
     entries = [
         Entry("shape", "sections"),
         Entry("files", [relative(f, folder) for f in files], f"{len(points)} sections"),
         Entry("unit", unit, f"the files name none; the blade is {height:.4g} mm high with it", True),
+        *([] if columns is None else [Entry("columns", columns, "the files name none", True)]),
         Entry("edge_share", 0.12, "part left out at each edge", True),
         Entry("span", [0.1, 1.0], "part of the span that is cut", True),
     ]
@@ -114,10 +139,10 @@ def _numbered_files(file: Path) -> list[Path]:
     return [path for _, path in sorted(hits)]
 
 
-def _unit(files: Sequence[Path]) -> str:
+def _unit(files: Sequence[Path], columns: str | None) -> str:
     """The first unit in which the blade is not tiny."""
     for unit in ("mm", "cm", "inch", "m"):
-        size, _ = _sizes(read_sections(files, unit))
+        size, _ = _sizes(read_sections(files, unit, columns=columns))
         if size >= LEAST_MM:
             return unit
     return next(iter(MM_PER))
@@ -131,10 +156,12 @@ def _sizes(points: Sequence[Any]) -> tuple[float, float]:
 
 def _draft(title: str, shape: list[Entry], size: float, height: float, machine: str | None) -> Draft:
     """The draft of a blade of aluminium, cut by a ball nose."""
+    d = next((d for d in BALLS if d <= LOW * height), BALLS[-1])
+    stock = min(0.3, 0.1 * d)
     wall = (
         *shape,
-        Entry("foot_mm", round(0.12 * height, 3), "height above the clamp that keeps its stock", True),
-        Entry("allowance_mm", [0.3, 0.3], "stock on both sides", True),
+        Entry("foot_mm", round(max(0.12 * height, 0.6 * d), 3), "height above the clamp that keeps its stock", True),
+        Entry("allowance_mm", [stock, stock], "stock on both sides", True),
         Entry("elements", [6, 6]),
     )
     key = "file" if machine is not None and machine.lower().endswith(".toml") else "name"
@@ -145,7 +172,6 @@ def _draft(title: str, shape: list[Entry], size: float, height: float, machine: 
         Entry("density_kg_m3", 2810.0, "of this alloy", True),
         Entry("yield_mpa", 503.0, "of this alloy", True),
     )
-    d = 8.0
     ball = {
         "diameter_mm": d, "corner_radius_mm": 0.5 * d, "flutes": 4, "flute_length_mm": d, "overhang_mm": 4.0 * d,
     }  # fmt: skip
@@ -161,7 +187,7 @@ def _draft(title: str, shape: list[Entry], size: float, height: float, machine: 
         Entry("lead_deg", 0.0),
         Entry("scallop_um", 30.0, "height between rows", True),
         Entry("depth_min_mm", 0.04),
-        Entry("depth_max_mm", 0.3),
+        Entry("depth_max_mm", stock),
         Entry("slope", 0.05),
         Entry("reserve", 0.05),
         Entry("clearance_mm", 1.5),
