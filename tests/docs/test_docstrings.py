@@ -20,7 +20,7 @@ def documented(name: str) -> list[str]:
     value = getattr(chipload, name)
     missing = [] if (value.__doc__ or "").strip() else [name]
     if inspect.isclass(value):
-        for key, member in vars(value).items():
+        for key, member in list(vars(value).items()):
             inner = member.fget if isinstance(member, property) else getattr(member, "func", member)
             inner = getattr(inner, "__func__", inner)
             own = inspect.isfunction(inner) and inner.__name__ == key  # not the default of a field
