@@ -113,7 +113,7 @@ def main() -> None:
     rows.append(("build", process_time() - t, "s"))
     rows.append(("long wall, opposite", opposite(work), "um/N"))
     rows.append(("unknowns", 3.0 * len(work.modes), ""))
-    rows.append(("factors", 2.0 * 12.0 * work.factors.lu.nnz / 2.0 / 1e6, "MB"))
+    rows.append(("factors", 8.0 * work.factors.entries / 1e6, "MB"))
     equal = grid_over((0, 0, 0), (100, 60, 30), grid.widest, order)
     rows.append(("the same, equal cells", opposite(cell_workpiece(stock, equal, elastic, [clamp])), "um/N"))
     stock.remove(29, shapely.box(0, 0, 20, 2))

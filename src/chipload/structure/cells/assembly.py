@@ -20,8 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.lazy import scipy
+from chipload.lazy import LateModule, scipy
 from chipload.structure.cells.grid import Array, CellGrid, Indices, product_tensors
+
+_assembly = LateModule("chipload.structure.cells._assembly")
 
 #: stiffness of the empty part of a cut cell over that of the material
 ALPHA = 1e-9
@@ -171,34 +173,16 @@ def _assemble_cells(
     some = np.flatnonzero(M.any(axis=1))
     M, number, u = M[some], modes.number[some], len(modes)
     m = number.shape[1]
-    # blocks on and above the diagonal of the lattice: the others are their transposes
-    pairs = [(a, b) for a in range(m) for b in range(a, m)]
-    keys = np.unique(np.concatenate([_keys(number, a, b, u) for a, b in pairs]))
-    keys = keys[keys >= 0]
-    data = np.zeros((len(keys), 3, 3))
+    meets = scipy.sparse.csr_array(
+        (np.ones(int((number >= 0).sum())), number[number >= 0], np.append(0, np.cumsum((number >= 0).sum(axis=1)))),
+        shape=(len(number), u),
+    )
+    pattern = scipy.sparse.csr_array(meets.T @ meets)
+    pattern.sort_indices()
+    indptr, indices = pattern.indptr, pattern.indices
+    data = np.zeros((len(indices), 3, 3))
     for a in range(m):
         part = tensors[:, a, a:]
         blocks = law((M @ part.reshape(len(part), -1)).reshape(len(M), *part.shape[1:]), some)
-        for b in range(a, m):
-            key = _keys(number, a, b, u)
-            own = np.flatnonzero(key >= 0)
-            lower = own[number[own, a] > number[own, b]]
-            block = blocks[:, b - a]
-            if len(lower):
-                block[lower] = block[lower].swapaxes(1, 2)
-            # a pair of modes of given places in the cell is that of one cell only
-            data[np.searchsorted(keys, key[own])] += block[own]
-    row, column = keys // u, keys % u
-    off = row != column
-    both = (np.append(row, column[off]), np.append(column, row[off]))
-    at = scipy.sparse.coo_array((np.arange(1, len(both[0]) + 1), both), shape=(u, u)).tocsr()
-    every = np.concatenate([data, data[off].swapaxes(1, 2)])
-    return scipy.sparse.csr_array(
-        scipy.sparse.bsr_array((every[at.data - 1], at.indices, at.indptr), shape=(3 * u, 3 * u))
-    )
-
-
-def _keys(number: Indices, a: int, b: int, u: int) -> Indices:
-    """(e,) int which block of the matrix modes a and b of each cell belong to; -1: none."""
-    p, q = number[:, a], number[:, b]
-    return np.where((p >= 0) & (q >= 0), np.minimum(p, q) * u + np.maximum(p, q), -1)
+        _assembly.add_blocks(number, a, np.ascontiguousarray(blocks), indptr, indices, data)
+    return scipy.sparse.csr_array(scipy.sparse.bsr_array((data, indices, indptr), shape=(3 * u, 3 * u)))

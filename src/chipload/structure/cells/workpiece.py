@@ -26,10 +26,10 @@ from chipload.lazy import scipy
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.assembly import LEAST_SHARE, CellModes, mass, modes_of, shares, stiffness
 from chipload.structure.cells.clamp import Clamp, clamp_stiffness
+from chipload.structure.cells.fronts import FrontFactors, factor_fronts
 from chipload.structure.cells.grid import Array, CellGrid, Indices, shape_values
 from chipload.structure.cells.moments import stock_moments
 from chipload.structure.cells.nearest import StockSections
-from chipload.structure.factors import Factors
 
 #: points along a contact line over which the force is spread, at least, and a cell
 SPREAD, PER_CELL = 4, 3
@@ -109,7 +109,7 @@ class CellWorkpiece:
     modes: CellModes
     share: Array
     stiffness: scipy.sparse.csr_array
-    factors: Factors
+    factors: FrontFactors
     order: Indices
     place: Indices
     volume: float
@@ -159,20 +159,23 @@ def cell_workpiece(
     )  # fmt: skip
 
 
-def factor_modes(grid: CellGrid, modes: CellModes, K: scipy.sparse.csr_array) -> tuple[Factors, Indices, Indices]:
+def factor_modes(grid: CellGrid, modes: CellModes, K: scipy.sparse.csr_array) -> tuple[FrontFactors, Indices, Indices]:
     """Factors of a stiffness (3 u, 3 u) in an order of nested dissection, that order (3 u,), and its inverse."""
-    order = (3 * dissect_modes(modes.lattice, grid.order)[:, None] + np.arange(3)).ravel()
+    pieces = dissect_modes(modes.lattice, grid.order)
+    order = (3 * np.concatenate(pieces)[:, None] + np.arange(3)).ravel()
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
-    options = {"SymmetricMode": True}
-    lu = scipy.sparse.linalg.splu(
-        scipy.sparse.csc_array(K[order][:, order]), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options
-    )
-    return Factors(lu), order, place
+    return factor_fronts(K, order, [3 * len(piece) for piece in pieces]), order, place
 
 
-def dissect_modes(lattice: Indices, p: int) -> Indices:
-    """Order of modes by nested dissection, (u,) int; ``lattice`` (u, 3) int their places, ``p`` the order of cells."""
+def dissect_modes(lattice: Indices, p: int) -> list[Indices]:
+    """Modes (n,) int of pieces and planes by nested dissection, in the order of elimination.
+
+    Parameters
+    ----------
+    lattice : (u, 3) int, places of the modes
+    p : order of the cells
+    """
     out: list[Indices] = []
     waiting: list[tuple[Indices, bool]] = [(np.arange(len(lattice)), False)]
     while waiting:
@@ -185,7 +188,7 @@ def dissect_modes(lattice: Indices, p: int) -> Indices:
         v = lattice[some, axis]
         # taken from the end: below, above, then the plane between
         waiting += [(some[v == at], True), (some[v > at], False), (some[v < at], False)]
-    return np.concatenate(out)
+    return out
 
 
 def _separator(at: Indices, p: int) -> tuple[int, int] | None:
