@@ -48,6 +48,8 @@ SPACING = 0.5
 FLOOR = 0.01
 #: change of a frequency between two states, over that of the deflection
 FREQUENCY = 0.5
+#: numbers of the factors of states, of which half may be kept while another is made: 1.8 GB
+KEPT = 220_000_000
 #: steps with most deflection, and with most force, whose stress is calculated
 STRAINED = 6
 
@@ -171,14 +173,8 @@ def workpiece_compliance(
         program, stock, cutters, material, resolution, lambda done, what: progress(0.4 * done, what),
     )  # fmt: skip
     grid, wall = cells_over(stock, ahead.before(ahead.states[-1][0]), workpiece.cell_mm, workpiece.order)
-    most = [0]
-
-    def build(then: LayeredStock, cells: CellGrid) -> CellWorkpiece:
-        made = cell_workpiece(then, cells, elastic, clamps, clamped_parts)
-        most[0] = max(most[0], 3 * len(made.modes))
-        return made
-
-    states = [RemovalState(k, v, lambda k=k: build(ahead.before(k), grid)) for k, v in ahead.states]  # type: ignore[misc]
+    build = _WorkpieceStates(ahead, lambda then, cells: cell_workpiece(then, cells, elastic, clamps, clamped_parts))
+    states = [RemovalState(k, v, lambda k=k: build(k, grid)) for k, v in ahead.states]  # type: ignore[misc]
     share = workpiece.state_change_percent / 100.0
     spacing = SPACING * grid.widest
     watch = None if workpiece.density_kg_m3 is None else ModesOfStates(ahead.lines, workpiece.modes, spacing)
@@ -209,7 +205,7 @@ def workpiece_compliance(
         found,
         wall,
         grid.widest,
-        most[0],
+        build.unknowns,
         float(error + FLOOR + change),
         change,
         findings,
@@ -219,11 +215,39 @@ def workpiece_compliance(
     )
 
 
+class _WorkpieceStates:
+    """The workpiece before steps of a program; those that were used last are kept, as far as :data:`KEPT` allows.
+
+    Attributes
+    ----------
+    unknowns : of the state with most
+    """
+
+    def __init__(self, ahead: CutAhead, make: Callable[[LayeredStock, CellGrid], CellWorkpiece]) -> None:
+        self.ahead, self.make, self.unknowns = ahead, make, 0
+        self._kept: dict[tuple[int, CellGrid], CellWorkpiece] = {}
+
+    def __call__(self, step: int, cells: CellGrid) -> CellWorkpiece:
+        """Return the workpiece before a step, in cells."""
+        key = (step, cells)
+        made = self._kept.pop(key, None)
+        if made is None:
+            while self._kept and 2 * self._kept_entries() > KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            made = self.make(self.ahead.before(step), cells)
+            self.unknowns = max(self.unknowns, 3 * len(made.modes))
+        self._kept[key] = made
+        return made
+
+    def _kept_entries(self) -> int:
+        return sum(work.factors.entries for work in self._kept.values())
+
+
 def _stress_of_steps(
     found: StepCompliances,
     ahead: CutAhead,
     grid: CellGrid,
-    build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
+    build: Callable[[int, CellGrid], CellWorkpiece],
     elastic: Elastic,
     strength: float,
 ) -> StrainedSteps:
@@ -236,7 +260,7 @@ def _stress_of_steps(
     away = grid.widest
     per_force, place = np.zeros(len(rows)), np.zeros((len(rows), 3))
     for state in np.unique(after).tolist():
-        work = build(ahead.before(ahead.states[state][0]), grid)
+        work = build(ahead.states[state][0], grid)
         for k in np.flatnonzero(after == state).tolist():
             force = _force(ahead, int(rows[k]))
             found_one = greatest_stress(work, elastic, lines.lines[rows[k]], force, away)
@@ -256,27 +280,27 @@ def _bend_workpiece(
     found: StepCompliances,
     ahead: CutAhead,
     grid: CellGrid,
-    build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
+    build: Callable[[int, CellGrid], CellWorkpiece],
     cutters: Mapping[int, Cutter],
 ) -> BentWorkpiece:
     """Return the deformed workpiece in the state after its worst step, under the force of that step."""
-    row, stock = int(found.worst[0]), ahead.before(ahead.states[int(found.after[0])][0])
+    row, state = int(found.worst[0]), ahead.states[int(found.after[0])][0]
     force = _force(ahead, row)
     away = max(cutter.diameter for cutter in cutters.values())
-    return bent_workpiece(build(stock, grid), stock, int(found.step[row]), found.lines[row], force, away)
+    return bent_workpiece(build(state, grid), ahead.before(state), int(found.step[row]), found.lines[row], force, away)
 
 
 def _cell_error(
     found: StepCompliances,
     ahead: CutAhead,
     grid: CellGrid,
-    build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
+    build: Callable[[int, CellGrid], CellWorkpiece],
 ) -> float:
     """Return the error by the cells: from the greatest relative difference to wider cells at the worst places."""
     wide, error = grid.wider(COARSER), 0.0
     for state in np.unique(found.after).tolist():
         own = np.flatnonzero(found.after == state)
-        work = build(ahead.before(ahead.states[state][0]), wide)
+        work = build(ahead.states[state][0], wide)
         other = size_of(line_compliances(work, found.lines[found.worst[own]]))
         size = size_of(found.after_compliance[own])
         error = max(error, float(np.abs(other / size - 1.0).max(initial=0.0)))

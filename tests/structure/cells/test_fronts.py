@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_array, csr_array, random_array
+from scipy.sparse import bsr_array, csc_array, random_array
 
 from chipload.errors import InputError
 from chipload.structure.cells.fronts import factor_fronts
@@ -27,7 +27,7 @@ def test_against_dense(sizes, columns):
     right[100, 0] = 1.0
     expected = np.linalg.solve(A.toarray(), right)
     order = np.random.default_rng(2).permutation(150)
-    factors = factor_fronts(csr_array(A), order, sizes)
+    factors = factor_fronts(bsr_array(A, blocksize=(1, 1)), order, sizes)
     rows = np.array([140, 3, 77])
     right, expected = right[order], expected[order]
     before = right.copy()
@@ -37,14 +37,23 @@ def test_against_dense(sizes, columns):
     np.testing.assert_array_equal(right, before)
 
 
+def test_blocks_of_three():
+    A = matrix(150, 3)
+    order = np.random.default_rng(2).permutation(50)
+    factors = factor_fronts(bsr_array(A, blocksize=(3, 3)), order, [4, 20, 1, 25])
+    right = np.random.default_rng(1).standard_normal((150, 4))
+    at = (3 * order[:, None] + np.arange(3)).ravel()
+    np.testing.assert_allclose(factors.solve(right[at]), np.linalg.solve(A.toarray(), right)[at], atol=1e-11)
+
+
 def test_fronts_that_touch_nothing_later():
-    A = csr_array(np.diag([2.0, 4.0, 8.0]))
+    A = bsr_array(np.diag([2.0, 4.0, 8.0]), blocksize=(1, 1))
     assert factor_fronts(A, np.arange(3), [1, 1, 1]).solve(np.ones(3)).tolist() == pytest.approx([0.5, 0.25, 0.125])
 
 
 def test_what_is_not_held_is_refused():
     with pytest.raises(InputError, match="stiffness: not positive definite: a part of the workpiece is not held"):
-        factor_fronts(csr_array([[1.0, 1.0], [1.0, 0.5]]), np.arange(2), [1, 1])
+        factor_fronts(bsr_array([[1.0, 1.0], [1.0, 0.5]], blocksize=(1, 1)), np.arange(2), [1, 1])
 
 
 def test_a_plane_separates_two_pieces():

@@ -7,27 +7,33 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def add_columns(indptr, indices, data, order, position, first, last, place, own, border):
-    """Add the unknowns ``first`` to ``last`` of an order of elimination, with later ones, to their front.
+    """Add the nodes ``first`` to ``last`` of an order of elimination, with later ones, to their front.
 
-    ``indptr``, ``indices``, ``data`` the rows of a symmetric matrix; ``order`` (f,) and ``position`` (f,) its inverse;
-    ``place`` (f,) by position the row of an unknown in the front; ``own`` (n, n) and ``border`` (b, n) its dense parts.
+    ``indptr``, ``indices``, ``data`` the rows of a symmetric matrix by blocks (s, s), one for a pair of nodes;
+    ``order`` (u,) and ``position`` (u,) its inverse; ``place`` (u,) by position the block of a node in the front;
+    ``own`` (n s, n s) and ``border`` (b s, n s) its dense parts.
     """
-    n = last - first
+    s, n = data.shape[1], own.shape[0]
     for j in range(first, last):
+        column = (j - first) * s
         for p in range(indptr[order[j]], indptr[order[j] + 1]):
             i = position[indices[p]]
             if i < j:
                 continue
-            r = place[i]
+            r = place[i] * s
             if r < n:
-                own[r, j - first] += data[p]
+                for a in range(s):
+                    for b in range(s):
+                        own[r + b, column + a] += data[p, a, b]
             else:
-                border[r - n, j - first] += data[p]
+                for a in range(s):
+                    for b in range(s):
+                        border[r - n + b, column + a] += data[p, a, b]
 
 
 @njit(cache=True, nogil=True)
 def mark_rows(indptr, indices, order, position, first, last, touched):
-    """Mark in ``touched`` (f,) the positions that the unknowns ``first`` to ``last`` meet."""
+    """Mark in ``touched`` (u,) the positions that the nodes ``first`` to ``last`` meet."""
     for j in range(first, last):
         for p in range(indptr[order[j]], indptr[order[j] + 1]):
             touched[position[indices[p]]] = True

@@ -104,7 +104,7 @@ def _corners(order: int) -> NDArray[np.bool_]:
 
 def stiffness(
     grid: CellGrid, modes: CellModes, moments: Array, modulus: float, poisson: float, alpha: float = ALPHA
-) -> scipy.sparse.csr_array:
+) -> scipy.sparse.bsr_array:
     """(3 u, 3 u) sparse stiffness [N/mm], all three directions of a mode side by side.
 
     Parameters
@@ -132,7 +132,7 @@ def stiffness(
     return _assemble_cells(modes, M, gradients, law)
 
 
-def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array) -> scipy.sparse.csr_array:
+def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array) -> scipy.sparse.bsr_array:
     """(3 u, 3 u) sparse stiffness [N/mm] of springs in the material.
 
     Parameters
@@ -145,7 +145,7 @@ def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array)
     return _assemble_cells(modes, M, values, lambda N, own: N[..., None, None] * per_volume)
 
 
-def mass(grid: CellGrid, modes: CellModes, moments: Array, density: float) -> scipy.sparse.csr_array:
+def mass(grid: CellGrid, modes: CellModes, moments: Array, density: float) -> scipy.sparse.bsr_array:
     """(3 u, 3 u) sparse mass [t]; ``density`` [t/mm^3]."""
     return springs(grid, modes, moments, density * np.eye(3))
 
@@ -163,7 +163,7 @@ def _volumes(grid: CellGrid, modes: CellModes) -> Array:
 
 def _assemble_cells(
     modes: CellModes, M: Array, tensors: Array, law: Callable[[Array, Indices], Array]
-) -> scipy.sparse.csr_array:
+) -> scipy.sparse.bsr_array:
     """The sum over cells of blocks (e, m, 3, 3) that ``law`` makes of M (e, n^3) times ``tensors`` (n^3, m, m, ...).
 
     Parameters
@@ -185,4 +185,4 @@ def _assemble_cells(
         part = tensors[:, a, a:]
         blocks = law((M @ part.reshape(len(part), -1)).reshape(len(M), *part.shape[1:]), some)
         _assembly.add_blocks(number, a, np.ascontiguousarray(blocks), indptr, indices, data)
-    return scipy.sparse.csr_array(scipy.sparse.bsr_array((data, indices, indptr), shape=(3 * u, 3 * u)))
+    return scipy.sparse.bsr_array((data, indices, indptr), shape=(3 * u, 3 * u))

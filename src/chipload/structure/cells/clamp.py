@@ -69,7 +69,7 @@ class ClampStiffness:
     cells : (nx, ny, nz) bool, cells with clamped material
     """
 
-    matrix: scipy.sparse.csr_array
+    matrix: scipy.sparse.bsr_array
     volumes: Array
     rigid: Array
     cells: NDArray[np.bool_]
@@ -96,7 +96,7 @@ def clamp_stiffness(
         A clamp holds no material, or a rigid motion is free.
     """
     count = 3 * len(modes)
-    whole, cells = scipy.sparse.csr_array((count, count)), np.zeros(grid.counts, dtype=np.bool_)
+    whole, cells = scipy.sparse.bsr_array((count, count), blocksize=(3, 3)), np.zeros(grid.counts, dtype=np.bool_)
     volumes, unit = [], []
     for k, clamp in enumerate(clamps):
         moments = stock_moments(stock, grid, clamp.region)
@@ -122,7 +122,7 @@ def clamp_stiffness(
     R = rigid_motions(grid, modes, _middle(grid, cells))
     S = sum((R.T @ (one @ R) for one in unit), np.zeros((6, 6)))
     require_clamped(S)
-    return ClampStiffness(scipy.sparse.csr_array(whole), np.array(volumes), S, cells)
+    return ClampStiffness(whole, np.array(volumes), S, cells)
 
 
 def require_clamped(S: Array) -> None:

@@ -94,14 +94,14 @@ class FrontFactors:
         return np.flatnonzero(wanted[:m])
 
 
-def factor_fronts(matrix: scipy.sparse.csr_array, order: Indices, sizes: Sequence[int]) -> FrontFactors:
+def factor_fronts(matrix: scipy.sparse.bsr_array, order: Indices, sizes: Sequence[int]) -> FrontFactors:
     """Factors of a symmetric positive definite matrix (f, f), O(f^1.5) for a plate, O(f^2) for a block.
 
     Parameters
     ----------
-    matrix : by rows, both triangles
-    order : (f,) int, unknowns in the order of elimination, which is that of the factors
-    sizes : (m,) unknowns of each front, in that order; a front may touch any later one
+    matrix : by rows of blocks (s, s), one for a pair of nodes; both triangles
+    order : (f / s,) int, nodes in the order of elimination, which is that of the factors
+    sizes : (m,) nodes of each front, in that order; a front may touch any later one
 
     Raises
     ------
@@ -110,39 +110,45 @@ def factor_fronts(matrix: scipy.sparse.csr_array, order: Indices, sizes: Sequenc
 
     Examples
     --------
-    >>> from scipy.sparse import csr_array
-    >>> A = csr_array([[4.0, 2.0], [2.0, 2.0]])
+    >>> from scipy.sparse import bsr_array
+    >>> A = bsr_array([[4.0, 2.0], [2.0, 2.0]], blocksize=(1, 1))
     >>> factor_fronts(A, np.array([0, 1]), [1, 1]).solve(np.array([2.0, 2.0])).tolist()
     [0.0, 1.0]
     """
     start = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    f, m = int(start[-1]), len(sizes)
+    u, m, s = int(start[-1]), len(sizes), matrix.blocksize[0]
     indptr, indices, data = matrix.indptr, matrix.indices, matrix.data
-    position, place, touched = np.empty_like(order), np.zeros(f, dtype=np.int64), np.zeros(f, dtype=np.bool_)
-    position[order] = np.arange(f)
+    position, place, touched = np.empty_like(order), np.zeros(u, dtype=np.int64), np.zeros(u, dtype=np.bool_)
+    position[order] = np.arange(u)
     parent, waiting = np.full(m, m, dtype=np.int64), dict[int, list[tuple[Indices, Array]]]()
     own, below, borders = list[Array](), list[Array](), list[Indices]()
     for k, (first, last) in enumerate(zip(start[:-1].tolist(), start[1:].tolist(), strict=True)):
         n, children = last - first, waiting.pop(k, [])
         _fronts.mark_rows(indptr, indices, order, position, first, last, touched)
-        for rows, _ in children:
-            touched[rows] = True
+        for nodes, _ in children:
+            touched[nodes] = True
         border = last + np.flatnonzero(touched[last:])
         touched[border] = False
         place[first:last] = np.arange(n)
         place[border] = n + np.arange(len(border))
-        L, B, rest = np.zeros((n, n)), np.zeros((len(border), n)), np.zeros((len(border), len(border)))
+        b = s * len(border)
+        L, B, rest = np.zeros((s * n, s * n)), np.zeros((b, s * n)), np.zeros((b, b))
         _fronts.add_columns(indptr, indices, data, order, position, first, last, place, L, B)
-        for rows, update in children:
-            _fronts.add_update(update, place[rows], L, B, rest)
+        for nodes, update in children:
+            _fronts.add_update(update, _unknowns(place[nodes], s), L, B, rest)
         _eliminate(L, B, rest)
         if len(border):
             parent[k] = int(np.searchsorted(start, border[0], side="right")) - 1
             waiting.setdefault(int(parent[k]), []).append((border, rest))
         own.append(L)
         below.append(B)
-        borders.append(border)
-    return FrontFactors(start, parent, tuple(own), tuple(below), tuple(borders))
+        borders.append(_unknowns(border, s))
+    return FrontFactors(s * start, parent, tuple(own), tuple(below), tuple(borders))
+
+
+def _unknowns(nodes: Indices, s: int) -> Indices:
+    """Return the unknowns of nodes, ``s`` each."""
+    return np.asarray((s * nodes[:, None] + np.arange(s)).ravel())
 
 
 def _eliminate(own: NDArray[np.float64], border: NDArray[np.float64], rest: NDArray[np.float64]) -> None:

@@ -184,7 +184,9 @@ def free_workpiece(stock: LayeredStock, grid: CellGrid, elastic: Elastic) -> Cel
     K = stiffness(grid, modes, moments, elastic.modulus, elastic.poisson)
     springs = np.zeros(3 * len(modes))
     springs[_six_of(grid, modes, share)] = elastic.modulus * grid.widest
-    K = scipy.sparse.csr_array(K + scipy.sparse.diags_array(springs))
+    u = len(modes)
+    held = springs.reshape(u, 3, 1) * np.eye(3)
+    K = K + scipy.sparse.bsr_array((held, np.arange(u), np.arange(u + 1)), shape=K.shape)
     factors, order, place = factor_modes(grid, modes, K)
     volume = float((share * grid.volumes).sum())
     return CellWorkpiece(

@@ -232,10 +232,11 @@ def _choose_states(
     """States that differ by at most ``tolerance`` of the greatest deflection or are ``most``, and their intervals."""
     states = solver.states
     chosen = _first_states(states)
-    spans: dict[tuple[int, int], float] = {}
-    for n, (a, b) in enumerate(pairwise(chosen)):
+    for n, k in enumerate(chosen):
         progress(n / most, "states of the workpiece")
-        spans[a, b] = solver.difference(a, b)
+        # the steps on both sides at once, so that no state is built twice
+        solver.compliance(k, solver.sampled(chosen[max(n - 1, 0)], chosen[min(n + 1, len(chosen) - 1)]))
+    spans = {(a, b): solver.difference(a, b) for a, b in pairwise(chosen)}
     while len(chosen) < most:
         progress(len(chosen) / most, "states of the workpiece")
         top = max(solver.deflection(b, solver.sampled(a, b)).max(initial=0.0) for a, b in spans)

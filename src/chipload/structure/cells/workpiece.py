@@ -108,7 +108,7 @@ class CellWorkpiece:
     grid: CellGrid
     modes: CellModes
     share: Array
-    stiffness: scipy.sparse.csr_array
+    stiffness: scipy.sparse.bsr_array
     factors: FrontFactors
     order: Indices
     place: Indices
@@ -116,7 +116,7 @@ class CellWorkpiece:
     loose: float
     clamped: Array
     sections: StockSections
-    mass: scipy.sparse.csr_array | None = None
+    mass: scipy.sparse.bsr_array | None = None
 
     def solve(self, right: Array) -> Array:
         """(3 u, q) displacements of the modes under forces (3 u, q)."""
@@ -154,18 +154,19 @@ def cell_workpiece(
     factors, order, place = factor_modes(grid, modes, K)
     volume = float((share * grid.volumes).sum())
     return CellWorkpiece(
-        grid, modes, share, scipy.sparse.csr_array(K), factors, order, place, volume, loose, springs.volumes,
+        grid, modes, share, K, factors, order, place, volume, loose, springs.volumes,
         StockSections(stock), None if elastic.density is None else mass(grid, modes, moments, elastic.density),
     )  # fmt: skip
 
 
-def factor_modes(grid: CellGrid, modes: CellModes, K: scipy.sparse.csr_array) -> tuple[FrontFactors, Indices, Indices]:
+def factor_modes(grid: CellGrid, modes: CellModes, K: scipy.sparse.bsr_array) -> tuple[FrontFactors, Indices, Indices]:
     """Factors of a stiffness (3 u, 3 u) in an order of nested dissection, that order (3 u,), and its inverse."""
     pieces = dissect_modes(modes.lattice, grid.order)
-    order = (3 * np.concatenate(pieces)[:, None] + np.arange(3)).ravel()
+    nodes = np.concatenate(pieces)
+    order = (3 * nodes[:, None] + np.arange(3)).ravel()
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
-    return factor_fronts(K, order, [3 * len(piece) for piece in pieces]), order, place
+    return factor_fronts(K, nodes, [len(piece) for piece in pieces]), order, place
 
 
 def dissect_modes(lattice: Indices, p: int) -> list[Indices]:
