@@ -206,6 +206,14 @@ def test_coarse_leaves_cells_that_are_as_wide_as_the_wall_allows(job_file):
     assert jobs.load_job(path, overrides).job.table.workpiece.cell_mm == 6.0
 
 
+def test_a_coarse_run_takes_the_widest_cells_of_the_job(job_file):
+    """2.5 times the wall of 2.5 mm, which a coarse run knows to 0.1 mm only, and its search to 1 %."""
+    path = changed(job_file, "states = 4", "states = 4\ncell_mm = 6.25")
+    coarse = jobs.load_job(path, coarser(jobs.load_job(path))).job
+    assert coarse.table.operation[0].tolerance_mm == pytest.approx(0.1)
+    assert run(coarse).simulated.workpiece.cell <= 6.25
+
+
 def test_cells_wider_than_the_wall_allows_are_refused(job_file):
     path = changed(job_file, "states = 4", "states = 4\ncell_mm = 8.0")
     with pytest.raises(

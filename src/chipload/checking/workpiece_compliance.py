@@ -172,7 +172,9 @@ def workpiece_compliance(
     ahead = cut_ahead(
         program, stock, cutters, material, resolution, lambda done, what: progress(0.4 * done, what),
     )  # fmt: skip
-    grid, wall = cells_over(stock, ahead.before(ahead.states[-1][0]), workpiece.cell_mm, workpiece.order)
+    grid, wall = cells_over(
+        stock, ahead.before(ahead.states[-1][0]), workpiece.cell_mm, workpiece.order, resolution.tolerance
+    )
     build = _WorkpieceStates(ahead, lambda then, cells: cell_workpiece(then, cells, elastic, clamps, clamped_parts))
     states = [RemovalState(k, v, lambda k=k: build(k, grid)) for k, v in ahead.states]  # type: ignore[misc]
     share = workpiece.state_change_percent / 100.0

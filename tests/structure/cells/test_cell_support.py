@@ -12,9 +12,9 @@ from scipy.sparse import bsr_array
 from chipload.errors import InputError
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
-from chipload.structure.cells.fronts import factor_fronts
 from chipload.structure.cells.grid import grid_over
 from chipload.structure.cells.moments import StockRegion
+from chipload.structure.cells.supernodes import factor_supernodes
 from chipload.structure.cells.support import support_line
 from chipload.structure.cells.workpiece import Elastic, cell_workpiece, displacements, line_compliances, mode_weights
 
@@ -36,7 +36,7 @@ def test_a_support_is_a_spring_in_the_stiffness(wall):
         w = mode_weights(wall, np.array([point])).toarray()[0]
         r = np.outer(w, normal).ravel()
         K = bsr_array(wall.stiffness + 1e4 * bsr_array(np.outer(r, r), blocksize=(3, 3)))
-        factors = factor_fronts(K, wall.order[::3] // 3, [len(wall.modes)])
+        factors = factor_supernodes(K, wall.order[::3] // 3, [len(wall.modes)])
         built = replace(wall, stiffness=K, factors=factors)
         C = line_compliances(built, [LINE])[0, 1]
         assert found.after[k] == pytest.approx(np.linalg.norm(C @ FORCE), rel=1e-6)

@@ -90,7 +90,7 @@ def thinnest_floor(stock: LayeredStock, most: float) -> float:
 
 
 def cells_over(
-    first: LayeredStock, last: LayeredStock, cell_mm: float | None, order: int = 2
+    first: LayeredStock, last: LayeredStock, cell_mm: float | None, order: int = 2, known_mm: float = 0.0
 ) -> tuple[CellGrid, float]:
     """Cells for a stock that is cut, and the thickness [mm] of the thinnest wall that is left.
 
@@ -98,6 +98,7 @@ def cells_over(
     ----------
     first, last : before and after the program
     cell_mm : longest side of a cell [mm]; None: by the thinnest wall
+    known_mm : tolerance of the outlines of ``last``, by which a wall may be thicker than its outlines
 
     Raises
     ------
@@ -107,7 +108,7 @@ def cells_over(
     side = max(float(v[-1] - v[0]) for v in (first.xs, first.ys, first.bounds))
     wall, faces = thinnest(last, side / 1000.0, side / LEAST_CELLS), flat_faces(last)
     if cell_mm is not None:
-        if cell_mm > MOST * wall * (1.0 + 1e-6):
+        if cell_mm > MOST * (wall * GROWTH ** (0.5**HALVINGS) + known_mm):
             raise InputError(
                 f"workpiece.cell_mm = {cell_mm:g}: the thinnest wall left is {wall:.3g} mm: at most {MOST:g} times "
                 f"that, {MOST * wall:.3g}"

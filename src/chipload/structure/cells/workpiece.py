@@ -26,10 +26,10 @@ from chipload.lazy import scipy
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.assembly import LEAST_SHARE, CellModes, mass, modes_of, shares, stiffness
 from chipload.structure.cells.clamp import Clamp, clamp_stiffness
-from chipload.structure.cells.fronts import FrontFactors, factor_fronts
 from chipload.structure.cells.grid import Array, CellGrid, Indices, shape_values
 from chipload.structure.cells.moments import stock_moments
 from chipload.structure.cells.nearest import StockSections
+from chipload.structure.cells.supernodes import SupernodeFactors, factor_supernodes
 
 #: points along a contact line over which the force is spread, at least, and a cell
 SPREAD, PER_CELL = 4, 3
@@ -109,7 +109,7 @@ class CellWorkpiece:
     modes: CellModes
     share: Array
     stiffness: scipy.sparse.bsr_array
-    factors: FrontFactors
+    factors: SupernodeFactors
     order: Indices
     place: Indices
     volume: float
@@ -159,14 +159,16 @@ def cell_workpiece(
     )  # fmt: skip
 
 
-def factor_modes(grid: CellGrid, modes: CellModes, K: scipy.sparse.bsr_array) -> tuple[FrontFactors, Indices, Indices]:
+def factor_modes(
+    grid: CellGrid, modes: CellModes, K: scipy.sparse.bsr_array
+) -> tuple[SupernodeFactors, Indices, Indices]:
     """Factors of a stiffness (3 u, 3 u) in an order of nested dissection, that order (3 u,), and its inverse."""
     pieces = dissect_modes(modes.lattice, grid.order)
     nodes = np.concatenate(pieces)
     order = (3 * nodes[:, None] + np.arange(3)).ravel()
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
-    return factor_fronts(K, nodes, [len(piece) for piece in pieces]), order, place
+    return factor_supernodes(K, nodes, [len(piece) for piece in pieces]), order, place
 
 
 def dissect_modes(lattice: Indices, p: int) -> list[Indices]:

@@ -1,4 +1,4 @@
-"""Compiled sums of dense fronts. Oracle: dense algebra, in tests/structure/cells."""
+"""Compiled sums of dense supernodes. Oracle: dense algebra, in tests/structure/cells."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def add_columns(indptr, indices, data, order, position, first, last, place, own, border):
-    """Add the nodes ``first`` to ``last`` of an order of elimination, with later ones, to their front.
+    """Add the nodes ``first`` to ``last`` of an order of elimination, with later ones, to their supernode.
 
     ``indptr``, ``indices``, ``data`` the rows of a symmetric matrix by blocks (s, s), one for a pair of nodes;
-    ``order`` (u,) and ``position`` (u,) its inverse; ``place`` (u,) by position the block of a node in the front;
+    ``order`` (u,) and ``position`` (u,) its inverse; ``place`` (u,) by position the block of a node in the supernode;
     ``own`` (n s, n s) and ``border`` (b s, n s) its dense parts.
     """
     s, n = data.shape[1], own.shape[0]
@@ -41,7 +41,7 @@ def mark_rows(indptr, indices, order, position, first, last, touched):
 
 @njit(cache=True, nogil=True)
 def add_update(update, rows, own, border, rest):
-    """Add the lower triangle of what an eliminated front leaves (m, m) to that above it.
+    """Add the lower triangle of what an eliminated supernode leaves (m, m) to that above it.
 
     ``rows`` (m,) its rows there, rising; ``own`` (n, n), ``border`` (b, n), ``rest`` (b, b) lower triangles.
     """

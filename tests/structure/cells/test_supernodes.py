@@ -1,4 +1,4 @@
-"""Dense fronts against dense algebra, and an order of nested dissection that separates what it says."""
+"""Dense supernodes against dense algebra, and an order of nested dissection that separates what it says."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import bsr_array, csc_array, random_array
 
 from chipload.errors import InputError
-from chipload.structure.cells.fronts import factor_fronts
+from chipload.structure.cells.supernodes import factor_supernodes
 from chipload.structure.cells.workpiece import dissect_modes
 
 SIZES = {"one": [150], "each": [1] * 150, "mixed": [7, 40, 1, 60, 30, 12]}
@@ -27,7 +27,7 @@ def test_against_dense(sizes, columns):
     right[100, 0] = 1.0
     expected = np.linalg.solve(A.toarray(), right)
     order = np.random.default_rng(2).permutation(150)
-    factors = factor_fronts(bsr_array(A, blocksize=(1, 1)), order, sizes)
+    factors = factor_supernodes(bsr_array(A, blocksize=(1, 1)), order, sizes)
     rows = np.array([140, 3, 77])
     right, expected = right[order], expected[order]
     before = right.copy()
@@ -40,20 +40,20 @@ def test_against_dense(sizes, columns):
 def test_blocks_of_three():
     A = matrix(150, 3)
     order = np.random.default_rng(2).permutation(50)
-    factors = factor_fronts(bsr_array(A, blocksize=(3, 3)), order, [4, 20, 1, 25])
+    factors = factor_supernodes(bsr_array(A, blocksize=(3, 3)), order, [4, 20, 1, 25])
     right = np.random.default_rng(1).standard_normal((150, 4))
     at = (3 * order[:, None] + np.arange(3)).ravel()
     np.testing.assert_allclose(factors.solve(right[at]), np.linalg.solve(A.toarray(), right)[at], atol=1e-11)
 
 
-def test_fronts_that_touch_nothing_later():
+def test_supernodes_that_touch_nothing_later():
     A = bsr_array(np.diag([2.0, 4.0, 8.0]), blocksize=(1, 1))
-    assert factor_fronts(A, np.arange(3), [1, 1, 1]).solve(np.ones(3)).tolist() == pytest.approx([0.5, 0.25, 0.125])
+    assert factor_supernodes(A, np.arange(3), [1, 1, 1]).solve(np.ones(3)).tolist() == pytest.approx([0.5, 0.25, 0.125])
 
 
 def test_what_is_not_held_is_refused():
     with pytest.raises(InputError, match="stiffness: not positive definite: a part of the workpiece is not held"):
-        factor_fronts(bsr_array([[1.0, 1.0], [1.0, 0.5]], blocksize=(1, 1)), np.arange(2), [1, 1])
+        factor_supernodes(bsr_array([[1.0, 1.0], [1.0, 0.5]], blocksize=(1, 1)), np.arange(2), [1, 1])
 
 
 def test_a_plane_separates_two_pieces():

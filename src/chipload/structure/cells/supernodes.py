@@ -1,14 +1,16 @@
-"""Factors of a stiffness in an order of nested dissection, by dense fronts.
+"""Factors of a stiffness in an order of nested dissection, by dense supernodes.
 
 Notation: A = L L^T. The unknowns of a piece that is not cut further, or of a plane between two pieces, are one
-**front**: n own unknowns, eliminated together, and b unknowns of later fronts beside them, its border. With the sums of
-A and of what the fronts below leave, in blocks A_11 (n, n), A_21 (b, n), A_22 (b, b),
+**supernode**: n own unknowns, eliminated together, and b unknowns of later supernodes beside them, its border. With the
+sums of A and of what the supernodes below leave, in blocks A_11 (n, n), A_21 (b, n), A_22 (b, b),
 
-    A_11 = L_11 L_11^T,  L_21 = A_21 L_11^-T,  A_22 - L_21 L_21^T goes on to the front of the border's first unknown.
+    A_11 = L_11 L_11^T,  L_21 = A_21 L_11^-T,
 
-All work is dense algebra on a few hundred rows at once, and L is kept once: a third of the time and a quarter of the
-memory of SuperLU in the same order (docs/design/workpiece.md). Right-hand sides are solved together; fronts without a
-force are left out, and in the substitution backwards those on which no wanted row depends.
+and A_22 - L_21 L_21^T goes on to the supernode of the border's first unknown.
+
+All work is dense algebra on a few hundred rows at once, and L is kept once, which takes a third of the time and a
+quarter of the memory of SuperLU in the same order (docs/design/workpiece.md). Right-hand sides are solved together;
+supernodes without a force are left out, and in the substitution backwards those on which no wanted row depends.
 
 Reference: [Duff1983].
 """
@@ -25,17 +27,17 @@ from chipload.errors import InputError
 from chipload.lazy import LateModule, scipy
 from chipload.structure.cells.grid import Array, Indices
 
-_fronts = LateModule("chipload.structure.cells._fronts")
+_supernodes = LateModule("chipload.structure.cells._supernodes")
 
 
 @dataclass(frozen=True, eq=False)
-class FrontFactors:
+class SupernodeFactors:
     """Factors of a symmetric positive definite matrix.
 
     Attributes
     ----------
-    start : (m + 1,) int, first unknown of each front, and the number of unknowns
-    parent : (m,) int, front to which each goes on; m: none
+    start : (m + 1,) int, first unknown of each supernode, and the number of unknowns
+    parent : (m,) int, supernode to which each goes on; m: none
     own : m lower triangles L_11 (n, n)
     below : m blocks L_21 (b, n)
     border : m (b,) int, unknowns of the borders, rising
@@ -82,7 +84,7 @@ class FrontFactors:
         return np.asarray(out[:, 0] if right.ndim == 1 else out)
 
     def _wanted(self, rows: Indices | None) -> Indices:
-        """Rising fronts of wanted rows and those above them."""
+        """Rising supernodes of wanted rows and those above them."""
         m = len(self.own)
         if rows is None:
             return np.arange(m)
@@ -94,14 +96,14 @@ class FrontFactors:
         return np.flatnonzero(wanted[:m])
 
 
-def factor_fronts(matrix: scipy.sparse.bsr_array, order: Indices, sizes: Sequence[int]) -> FrontFactors:
+def factor_supernodes(matrix: scipy.sparse.bsr_array, order: Indices, sizes: Sequence[int]) -> SupernodeFactors:
     """Factors of a symmetric positive definite matrix (f, f), O(f^1.5) for a plate, O(f^2) for a block.
 
     Parameters
     ----------
     matrix : by rows of blocks (s, s), one for a pair of nodes; both triangles
     order : (f / s,) int, nodes in the order of elimination, which is that of the factors
-    sizes : (m,) nodes of each front, in that order; a front may touch any later one
+    sizes : (m,) nodes of each supernode, in that order; a supernode may touch any later one
 
     Raises
     ------
@@ -112,7 +114,7 @@ def factor_fronts(matrix: scipy.sparse.bsr_array, order: Indices, sizes: Sequenc
     --------
     >>> from scipy.sparse import bsr_array
     >>> A = bsr_array([[4.0, 2.0], [2.0, 2.0]], blocksize=(1, 1))
-    >>> factor_fronts(A, np.array([0, 1]), [1, 1]).solve(np.array([2.0, 2.0])).tolist()
+    >>> factor_supernodes(A, np.array([0, 1]), [1, 1]).solve(np.array([2.0, 2.0])).tolist()
     [0.0, 1.0]
     """
     start = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
@@ -124,7 +126,7 @@ def factor_fronts(matrix: scipy.sparse.bsr_array, order: Indices, sizes: Sequenc
     own, below, borders = list[Array](), list[Array](), list[Indices]()
     for k, (first, last) in enumerate(zip(start[:-1].tolist(), start[1:].tolist(), strict=True)):
         n, children = last - first, waiting.pop(k, [])
-        _fronts.mark_rows(indptr, indices, order, position, first, last, touched)
+        _supernodes.mark_rows(indptr, indices, order, position, first, last, touched)
         for nodes, _ in children:
             touched[nodes] = True
         border = last + np.flatnonzero(touched[last:])
@@ -133,9 +135,9 @@ def factor_fronts(matrix: scipy.sparse.bsr_array, order: Indices, sizes: Sequenc
         place[border] = n + np.arange(len(border))
         b = s * len(border)
         L, B, rest = np.zeros((s * n, s * n)), np.zeros((b, s * n)), np.zeros((b, b))
-        _fronts.add_columns(indptr, indices, data, order, position, first, last, place, L, B)
+        _supernodes.add_columns(indptr, indices, data, order, position, first, last, place, L, B)
         for nodes, update in children:
-            _fronts.add_update(update, _unknowns(place[nodes], s), L, B, rest)
+            _supernodes.add_update(update, _unknowns(place[nodes], s), L, B, rest)
         _eliminate(L, B, rest)
         if len(border):
             parent[k] = int(np.searchsorted(start, border[0], side="right")) - 1
@@ -143,7 +145,7 @@ def factor_fronts(matrix: scipy.sparse.bsr_array, order: Indices, sizes: Sequenc
         own.append(L)
         below.append(B)
         borders.append(_unknowns(border, s))
-    return FrontFactors(s * start, parent, tuple(own), tuple(below), tuple(borders))
+    return SupernodeFactors(s * start, parent, tuple(own), tuple(below), tuple(borders))
 
 
 def _unknowns(nodes: Indices, s: int) -> Indices:
