@@ -4,10 +4,12 @@
 
 For each program: read (drafted), tools whose size a comment states and that the draft has from it, questions asked,
 verdict of the job with its guesses, seconds of processor time from the file to the verdict, which ``--seconds`` bounds,
-so that other work on the machine does not count; with ``--saving`` the times before and after the feeds are chosen,
-and the verdict of the new ones; with ``--drafts`` nothing is run; with ``--every 8`` one program of eight is taken.
-Files in folders named ``bad`` are to be refused and left out. The last lines are the shares of all programs but those
-that move nothing by themselves: subprograms whose parameters come from the controller, and texts that only set offsets.
+so that other work on the machine does not count. One without a verdict in that time is run again with ``--coarse``, in
+as much time, as the page does first: its verdict begins with "coarse". With ``--saving`` the times before and after the
+feeds are chosen, and the verdict of the new ones; with ``--drafts`` nothing is run; with ``--every 8`` one program of
+eight is taken. The last lines are the shares of all programs but those that move nothing by themselves: subprograms
+whose parameters come from the controller, and texts that only set offsets.
+Files in folders named ``bad`` are to be refused and left out.
 """
 
 from __future__ import annotations
@@ -106,8 +108,12 @@ def first_time(path: Path, folder: Path, seconds: float, saving: bool, drafts: b
     words = ["run", str(folder / "job" / "job.toml"), "--accept", "--out", str(folder / "r")]
     code, out, error, own = called(words, seconds - row.seconds)
     row.seconds += own
+    if code == 124:
+        code, out, error, row.seconds = called([*words, "--coarse", "--fresh"], seconds)
+        row.verdict = "no verdict in time" if code == 124 else f"coarse: {out.splitlines()[0][:100]}" if out else error
+        return row
     if code not in (0, 3):
-        row.verdict = "no verdict in time" if code == 124 else f"run: {error.strip()[:100]}"
+        row.verdict = f"run: {error.strip()[:100]}"
         return row
     row.verdict = out.splitlines()[0][:110]
     if saving:
@@ -147,9 +153,11 @@ def main() -> None:
     rows = [row for row in rows if row not in still]
     drafted = sum(row.read for row in rows)
     verdicts = sum(row.verdict.startswith(("Holds", "Exceeds", "Unproven")) for row in rows)
+    coarse = sum(row.verdict.startswith("coarse") for row in rows)
     sized, named = sum(row.sized for row in rows), sum(row.named for row in rows)
     print(f"\nmove nothing by themselves: {len(still)}")
     print(f"drafted: {drafted} of {len(rows)}; with a verdict in {options.seconds:g} s: {verdicts}")
+    print(f"of the others with a coarse one: {coarse}")
     print(f"tools that a comment states: {sized} of {named} read")
     print(f"most questions: {max((row.questions for row in rows), default=0)}")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chipload.jobs.drafts.comments import read_header
@@ -45,6 +46,10 @@ def test_comments_of_other_posts() -> None:
         ("(STOCK/BLOCK,90.00, 60.00, 8.00,0.00, 0.00, 8.00)", 1.0, (0, 0, -8), (90, 60, 0)),
         ("(STOCK/BLOCK,4., 2., 1., 2., 1., 1.)", 25.4, (-50.8, -25.4, -25.4), (50.8, 25.4, 0)),
         ("(STOCK 6061 DX 4.00IN DY 2.00IN DZ 1.00IN)", 1.0, (0, 0, -25.4), (101.6, 50.8, 0)),
+        ("(STOCK 60 X 40 X 20)", 1.0, (0, 0, -20), (60, 40, 0)),
+        ("(STOCK SIZE - 4.0 X 2.5 X .75)", 25.4, (0, 0, -19.05), (101.6, 63.5, 0)),
+        ("; Rohteil: 100x80x22.5 mm", 1.0, (0, 0, -22.5), (100, 80, 0)),
+        ('(MATERIAL 6061 - BLANK 4" X 2" X 1")', 1.0, (0, 0, -25.4), (101.6, 50.8, 0)),
         ("(STOCK LOWER X=-50. Y=-30. Z=-20.)\n(STOCK UPPER X=50. Y=30. Z=1.)", 1.0, (-50, -30, -20), (50, 30, 1)),
     ],
 )
@@ -54,6 +59,27 @@ def test_blocks_of_comments(
     found = read_header(text, mm=mm).stock
     assert found is not None
     assert found[0] == (pytest.approx(low), pytest.approx(high))
+
+
+@pytest.mark.parametrize("text", ["(STOCK 6061 T6)", "(T1 BLANK 4 X 45)", "(STOCK TO LEAVE 0.5)", "(M6 X 1 X 20 BOLT)"])
+def test_comments_that_state_no_block(text: str) -> None:
+    assert read_header(text).stock is None
+
+
+@pytest.mark.parametrize(("shift", "low"), [(0.0, [0.0, 0.0, -20.0]), (-30.0, [-30.0, -20.0, -20.0])])
+def test_a_size_alone_lies_where_the_program_cuts(tmp_path: Path, shift: float, low: list[float]) -> None:
+    """From its corner, or about its middle."""
+    path = tmp_path / "part.nc"
+    x, y = (np.array([5.0, 55.0]) + shift).tolist(), (np.array([5.0, 35.0]) + shift / 1.5).tolist()
+    path.write_text(
+        "%\nO00012\n(STOCK 60 X 40 X 20)\n(T1 D=10. CR=0. - ZMIN=-5. - FLAT END MILL)\nG90 G94 G17 G21\nT1 M6\n"
+        "S3000 M3\n"
+        f"G54 G0 X{x[0]:.3f} Y{y[0]:.3f}\nG43 Z10. H1\nG1 Z-5. F300.\nX{x[1]:.3f}\nY{y[1]:.3f}\nG0 Z10.\nM30\n%\n"
+    )
+    assert call("init", path, tmp_path / "job")[0] == 0
+    stock = tomllib.loads((tmp_path / "job" / "job.toml").read_text())["stock"]
+    assert stock["low_mm"] == pytest.approx(low)
+    assert stock["high_mm"] == pytest.approx([low[0] + 60.0, low[1] + 40.0, 0.0])
 
 
 def said_of(tools: str) -> dict[int, dict[str, object]]:

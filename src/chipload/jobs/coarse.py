@@ -50,6 +50,9 @@ FACTORS: Mapping[str, Mapping[str, tuple[float, float]]] = {
         "operation.paths.check_mm": (3.0, 1e3),
     },
 }
+#: longest step of a simulation, in smallest diameters: a longer one is calculated at as many instants, and where its
+#: engagement changes at 25 times as many all along
+LONGEST_STEP = 1.0
 #: layers of a stock that states none, in smallest diameters; slices of corner radii that a program job does not state
 LAYER, SLICES = 0.2, 8
 #: cells of the stock that is shown are so many times as wide
@@ -79,6 +82,8 @@ def coarser(loaded: LoadedJob) -> tuple[str, ...]:
             value = _number_of_key(entry, rest)
             if value is not None:
                 scaled = value * factor
+                if factors is SIMULATION and key == "operation.step_mm" and loaded.job.cutters:
+                    scaled = min(scaled, LONGEST_STEP * _smallest(loaded))
                 # a tolerance that is above what is coarse stays
                 new = max(min(scaled, most), value) if factor > 1.0 else max(scaled, 1)
                 out.append(f"{'.'.join(path)}={format_value(int(new) if isinstance(value, int) else new)}")
@@ -108,6 +113,11 @@ def _number_of_key(entry: Any, keys: Sequence[str]) -> float | int | None:
     return entry if isinstance(entry, (int, float)) and not isinstance(entry, bool) else None
 
 
+def _smallest(loaded: LoadedJob) -> float:
+    """The smallest diameter of the cutters of a job [mm]."""
+    return float(min(cutter.resolved_diameter for cutter in loaded.job.cutters.values()))
+
+
 def _of_program(loaded: LoadedJob) -> list[str]:
     """What a simulation chooses by itself where it is not stated."""
     job = loaded.job
@@ -115,8 +125,7 @@ def _of_program(loaded: LoadedJob) -> list[str]:
     stock = job.table.stock
     saved = stock is not None and stock.file is not None and stock.file.lower().endswith(".npz")
     if stock is not None and stock.layer_mm is None and not saved and job.cutters:
-        smallest = min(cutter.resolved_diameter for cutter in job.cutters.values())
-        out.append(f"stock.layer_mm={format_value(LAYER * smallest)}")
+        out.append(f"stock.layer_mm={format_value(LAYER * _smallest(loaded))}")
     for k, op in enumerate(job.table.operation):
         if op.corner_slices is None:
             out.append(f"operation.{k}.corner_slices={SLICES}")

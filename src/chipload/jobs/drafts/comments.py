@@ -43,10 +43,18 @@ _BLOCK = re.compile(r"\(\s*STOCK/BLOCK\s*,([^()\n]*)\)", re.IGNORECASE)
 #: by hand: size of the block; posts: its corners, ``STOCK LOWER X=.. Y=.. Z=..``
 _SIDE = rf"\s*=?\s*{_NUMBER}\s*(MM|IN)?"
 _SIDES = re.compile(rf"\bSTOCK\b[^()\n]*?\bDX{_SIDE}[ ,]*\bDY{_SIDE}[ ,]*\bDZ{_SIDE}", re.IGNORECASE)
+#: by hand: length, width and height, ``STOCK 60 X 40 X 20``, ``(ROHTEIL: 100x80x20 MM)``
+_BY_HAND = re.compile(
+    r"[(;][^()\n]*?\b(?:STOCK|BLANK|BILLET|MATERIAL|MATL|ROHTEIL|RAW|BLOCK)\b(?:[\s:=-]|\b(?:SIZE|DIMENSIONS?|IS|MATERIAL|STOCK)\b)*"
+    rf"{_NUMBER}\s*(MM|IN|\")?\s*[X*]\s*{_NUMBER}\s*(MM|IN|\")?\s*[X*]\s*{_NUMBER}\s*(MM|INCH|IN|\")?(?![0-9.])",
+    re.IGNORECASE,
+)
 _AT = rf"\s*[=:]?\s*{_NUMBER}"
 _BOUND = re.compile(rf"\bSTOCK\s+(LOWER|UPPER|MIN|MAX)\b[^()\n;]*?X{_AT}[ ,]+Y{_AT}[ ,]+Z{_AT}", re.IGNORECASE)
 #: Carbide Create: corners of the stock
 _CORNER = re.compile(r"\(\s*stock(Min|Max)\s*:([^()\n]*)\)", re.IGNORECASE)
+#: what is said of a block whose size alone is stated
+SIZE_ALONE = "the size that a comment states, with the program's zero on its top"
 #: signs that a number is not an alloy: a date, a time, the name of a file or a program
 _DATE = re.compile(
     r"\b(?:DATE|TIME|CREATED|OUTPUT|GENERATED|EXPORTED|POSTED|VERSION|COPYRIGHT|FILE|PROGRAM)\b|[0-9]{1,2}:[0-9]{2}|"
@@ -230,6 +238,11 @@ def _block_of_comments(text: str, mm: float) -> tuple[Box, str] | None:
         x, y, z = (own * float(hit[k]) for k in (1, 3, 5))
         if min(x, y, z) > 0.0:
             return ((0.0, 0.0, -z), (x, y, 0.0)), "DX DY DZ, with the program's zero at its lower left and top"
+    if (hit := _BY_HAND.search(text)) is not None:
+        own = next((MM_PER["mm" if u.upper() == "MM" else "inch"] for u in (hit[2], hit[4], hit[6]) if u), mm)
+        x, y, z = (own * float(hit[k]) for k in (1, 3, 5))
+        if min(x, y, z) > 0.0:
+            return ((0.0, 0.0, -z), (x, y, 0.0)), SIZE_ALONE
     return None
 
 

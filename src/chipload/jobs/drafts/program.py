@@ -14,7 +14,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import cutter_from_table
 from chipload.errors import Finding, InputError, Severity, group_findings
 from chipload.files import read_regular
-from chipload.jobs.drafts.comments import Box, Header, read_header
+from chipload.jobs.drafts.comments import SIZE_ALONE, Box, Header, read_header
 from chipload.jobs.drafts.cutters import cutter_table, size_of_name
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
 from chipload.jobs.drafts.setups import lines_of_setups, setup_tables
@@ -299,6 +299,8 @@ def _stock(program: Program, known: Known, header: Header) -> tuple[Box, tuple[E
     for stated in (known.stock, header.stock):
         if stated is not None:
             (low, high), where = stated
+            if where == SIZE_ALONE:
+                low, high = _place_of_size(program, (low, high))
             sure = where == "WORKPIECE" or where.startswith(("BLK", "workpiece", "stock of", "stockMin"))
             note = f"{where}" if sure else f"{where}: check it against the program's zero"
             return (low, high), (
@@ -310,6 +312,18 @@ def _stock(program: Program, known: Known, header: Header) -> tuple[Box, tuple[E
         (float(highest[0]), float(highest[1]), float(highest[2])),
     )
     return box, (Entry("low_mm", list(box[0]), why, True), Entry("high_mm", list(box[1]), why, True))
+
+
+def _place_of_size(program: Program, box: Box) -> Box:
+    """The block of a stated size, from its lower corner or about its middle: as the middle of its cuts lies nearer."""
+    low, high = box
+    cuts = program.p_work[_rows_at_feed(program)]
+    if not len(cuts):
+        return low, high
+    middle, half = 0.5 * (cuts[:, :2].min(axis=0) + cuts[:, :2].max(axis=0)), (0.5 * high[0], 0.5 * high[1])
+    if np.linalg.norm(middle) >= np.linalg.norm(middle - half):
+        return low, high
+    return (-half[0], -half[1], low[2]), (half[0], half[1], high[2])
 
 
 def _block_around(program: Program) -> tuple[np.ndarray, np.ndarray, str]:
