@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -97,6 +98,8 @@ def statement_change(check: LimitCheck, track: str) -> Change | None:
     own = check.budget
     if own is None or own.confidence <= 0.5 or check.state is not Verdict.UNPROVEN or check.worst is None:
         return None
+    if check.margin is not None and check.margin >= 0.0:
+        return None  # the budget leaves room: it is unproven for another reason
     best: tuple[float, ErrorPart] | None = None
     for part in own.parts:
         if not part.remedy:
@@ -111,7 +114,7 @@ def statement_change(check: LimitCheck, track: str) -> Change | None:
 
 
 def feed_change(track: Track, checks: Sequence[LimitCheck]) -> Change | None:
-    """Return the lower feed of the lines whose loads are too great; None: no feed from a fifth on settles the limits.
+    """Return the lower feed of the lines whose loads are too great; None: no feed from a fifth on would.
 
     Parameters
     ----------
@@ -143,7 +146,11 @@ def feed_change(track: Track, checks: Sequence[LimitCheck]) -> Change | None:
         if law is None:
             continue
         most = (1.0 - SPARE) * check.limit
-        k = law.greatest_factor(sizes[check.name][own], most, chip[own], SLOWEST, partial(_factor_at, check, chip))
+        needed = partial(
+            law.greatest_factor, sizes[check.name][own], most, chip[own], SLOWEST, partial(_factor_at, check, chip)
+        )
+        # where no feed settles it for certain, the one that does by the middle of what is known, with its interval
+        k = needed() or needed(sure=False)
         if k is None:
             return None
         factors.append((k, check, law))
@@ -151,16 +158,24 @@ def feed_change(track: Track, checks: Sequence[LimitCheck]) -> Change | None:
         return None
     # one percent is what a person writes
     lowest, check, law = min(factors, key=lambda one: one[0])
-    feed_share = float(np.floor(100.0 * lowest) / 100.0)
-    size = sizes[check.name]
-    least, greatest = law.ratios(feed_share, chip[own])
+    percent, size = math.floor(100.0 * lowest), sizes[check.name]
     rest = check.factor * float(size[~own].max(initial=0.0))
-    levels = (check.factor, _factor_at(check, chip, feed_share))
-    low, high = (
-        max(level * float((size[own] * x).max(initial=0.0)), rest)
-        for x, level in zip((least, greatest), levels, strict=True)
-    )
+
+    def ends(feed_share: float) -> tuple[float, float]:
+        levels = (check.factor, _factor_at(check, chip, feed_share))
+        low, high = (
+            max(level * float((size[own] * x).max(initial=0.0)), rest)
+            for x, level in zip(law.ratios(feed_share, chip[own]), levels, strict=True)
+        )
+        return low, high
+
+    while sum(ends(1e-2 * percent)) > 2.0 * check.limit and 1e-2 * percent > SLOWEST:
+        percent -= 1
+    feed_share = 1e-2 * percent
+    low, high = ends(feed_share)
     margin, error = 1.0 - 0.5 * (low + high) / check.limit, 0.5 * (high - low) / check.limit
+    if margin < 0.0:
+        return None
     text = f"feed of {_line_text(lines)} at {number_text(100.0 * feed_share, 3)} %"
     return Change(
         ChangeKind.FEED, text, check.column.label, margin, error, track.name, feed_share, tuple(lines.tolist())

@@ -80,7 +80,13 @@ class FeedLaw:
         return low + (1.0 - low) * factor, high + (1.0 - high) * factor**power
 
     def greatest_factor(
-        self, values: Floats, limit: float, chip_mm: Floats, least: float, error: Callable[[float], float]
+        self,
+        values: Floats,
+        limit: float,
+        chip_mm: Floats,
+        least: float,
+        error: Callable[[float], float],
+        sure: bool = True,
     ) -> float | None:
         """Return the greatest feed factor, at most 1, at which no value is above the limit; None: none from ``least``.
 
@@ -88,13 +94,15 @@ class FeedLaw:
         ----------
         values : (n,) nominal
         error : what a value may be at a feed factor over its nominal one
+        sure : by the greatest ratio; else by the mean of the least and the greatest
 
         >>> FeedLaw(0.0, 0.0).greatest_factor(np.array([200.0]), 150.0, np.array([0.1]), 0.2, lambda k: 1.0)
         0.75
         """
 
         def all_hold(k: float) -> bool:
-            return bool((values * error(k) * self.ratios(k, chip_mm)[1] <= limit).all())
+            low, high = self.ratios(k, chip_mm)
+            return bool((values * error(k) * (high if sure else 0.5 * (low + high)) <= limit).all())
 
         if not all_hold(least):
             return None
