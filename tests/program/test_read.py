@@ -1,6 +1,7 @@
 """Programs that their controller refuses, or that hold what is not read: the rest is read, and the gap is stated."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -93,3 +94,22 @@ def test_real_programs_that_were_refused_for_one_word():
         reading = read_program(path, VMC)
         assert {found for found, _ in gaps(reading)} == ({code} if code else set()), name
         assert len(reading.program) > motions, name
+
+
+@pytest.mark.parametrize(("machine", "dwell_s"), [("haas-vf-2", 2.0), ("vmc-fanuc", 0.002), ("brother-s700x1", 2.0)])
+def test_a_program_that_shows_no_control_is_read_as_the_machine_s(tmp_path: Path, machine, dwell_s):
+    """G4 P2. are two seconds on a Haas and a Brother; a Fanuc reads no point in P. P2 are two milliseconds."""
+    named = machine_named(machine)
+    text = "G90 G21 S3000 M3\nG0 X0. Y0. Z5.\nG1 X10. F300.\nG4 P{}\nG0 Z50.\nM30\n"
+    (tmp_path / "part.nc").write_text(text.format("2."))
+    long = read_program(tmp_path / "part.nc", named)
+    assert long.recognition.control.name == (named.control or named.dialect)
+    (tmp_path / "part.nc").write_text(text.format("2"))
+    short = read_program(tmp_path / "part.nc", named)
+    assert long.seconds.sum() - short.seconds.sum() == pytest.approx(dwell_s - 0.002, abs=1e-6)
+
+
+def test_a_machine_s_control_must_be_one(tmp_path: Path):
+    (tmp_path / "part.nc").write_text(MOVES + "M30\n")
+    with pytest.raises(InputError, match="control = 'has': must be one of linuxcnc, fanuc, haas"):
+        read_program(tmp_path / "part.nc", replace(VMC, control="has"))

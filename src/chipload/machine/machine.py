@@ -38,7 +38,7 @@ class Machine:
     feed_max : greatest speed along the path in G1, G2, G3 [mm/s], > 0
     spindle_min, spindle_max : [rad/s], 0 <= spindle_min <= spindle_max, spindle_max > 0; inf: not known
     corner_tolerance : greatest deviation of the path at a corner [mm], 0 to 1; 0: an exact stop at every corner
-    dialect : `linuxcnc` or `fanuc`
+    dialect : of the programs that are written for it, `linuxcnc` or `fanuc`
     decimals : number of decimals of a position in a program [mm], 3 to 6
     power_w : power of the spindle [W]; None: not known
     torque : torque of the spindle [N mm]; None: not known
@@ -52,6 +52,8 @@ class Machine:
     table : the block under the workpiece; None: not known
     tcp_words : blocks that begin and end tool centre point control, ``{tool}`` for the tool's number; None: it has none
     counter_clockwise : whether the spindle also turns counter-clockwise (M4)
+    control : as which control it reads programs that do not show theirs, a key of
+        :data:`chipload.program.control.CONTROLS`; empty: that of its dialect
 
     Raises
     ------
@@ -79,6 +81,7 @@ class Machine:
     block_time: float | None = None
     table: MachineTable | None = None
     counter_clockwise: bool = True
+    control: str = ""
 
     def __post_init__(self) -> None:
         def require(ok: bool, key: str, value: object, limit: str) -> None:
@@ -192,6 +195,7 @@ def _from_table(label: str, table: Row) -> Machine:
             block_time=_optional(top, "block_time_ms", 1e-3),
             table=_machine_table(label, top),
             counter_clockwise=bool(spindle.get("counter_clockwise", True)),
+            control=top.get("control", ""),
         )
     except InputError as err:
         text = str(err)
@@ -239,11 +243,11 @@ def _tcp_words(top: Row) -> tuple[str, str] | None:
 def read_machine(path: str | Path) -> Machine:
     """Read a machine from a TOML file, or from LinuxCNC's `.ini` (:func:`chipload.machine.ini.read_ini`).
 
-    Keys: ``name``, ``dialect``, ``decimals``, ``rapid_mm_min``, ``feed_max_mm_min``, ``corner_tolerance_mm``, optional
-    ``note``, ``jerk_mm_s3`` (along the path), ``jerk_low_mm_s3`` (what it is at least, where it is not known),
-    ``block_time_ms`` (least time of the control for a block; not with a trajectory planner), ``tcp_on`` and
-    ``tcp_off`` (words that begin and end tool centre point control), and ``chain``, the letters of the axes from the
-    workpiece to the tool (XYZ if left out).
+    Keys: ``name``, ``dialect``, ``decimals``, ``rapid_mm_min``, ``feed_max_mm_min``, ``corner_tolerance_mm``,
+    optional ``control`` (as which it reads programs that do not show theirs), ``note``, ``jerk_mm_s3`` (along the
+    path), ``jerk_low_mm_s3`` (what it is at least, where it is not known), ``block_time_ms`` (least time of the
+    control for a block; not with a trajectory planner), ``tcp_on`` and ``tcp_off`` (words that begin and end tool
+    centre point control), and ``chain``, the letters of the axes from the workpiece to the tool (XYZ if left out).
 
     In ``[axis.x]`` and the tables of the other linear axes: ``min_mm``, ``max_mm``, ``acceleration_mm_s2``, optional
     ``rate_mm_min`` (else the rapid rate), ``direction`` (else the letter's own), ``side`` (`table` or `head`, else

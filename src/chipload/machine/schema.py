@@ -24,6 +24,7 @@ _MACHINE = {
     "feed_max_mm_min": _NUMBER,
     "corner_tolerance_mm": _NUMBER,
     "chain?": _TEXT,
+    "control?": _TEXT,
     "note?": _TEXT,
     "jerk_mm_s3?": _NUMBER,
     "jerk_low_mm_s3?": _NUMBER,

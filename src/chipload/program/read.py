@@ -424,7 +424,7 @@ def control_of(
     if dialect is not None or ENDINGS.get(ending) is not None:
         return Recognition(control_named(dialect or kind), True), text
     text = gcode_text(path) if text is None else text
-    return recognise(text, machine.dialect, ending), text
+    return recognise(text, machine.control or machine.dialect, ending), text
 
 
 def dialect_of(path: Path, machine: Machine, stated: str | None = None) -> Dialect:

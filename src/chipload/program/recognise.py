@@ -96,7 +96,14 @@ def _kind_text(found: str) -> str:
 
 
 def recognise(text: str, machine: str, ending: str = "") -> Recognition:
-    """The control of a text; where nothing contradicts it, that of the machine, whose name is ``machine``."""
+    """The control of a text; where nothing contradicts it, that of the machine, whose name is ``machine``.
+
+    Raises
+    ------
+    InputError
+        There is no control of that name.
+    """
+    own = control_named(machine)
     found, named = scores(text), ENDINGS.get(ending)
     points = {
         name: score + OF_MACHINE * (name == machine) + DECISIVE * (name == named) for name, (score, _) in found.items()
@@ -104,7 +111,7 @@ def recognise(text: str, machine: str, ending: str = "") -> Recognition:
     order = sorted(points, key=lambda name: -points[name])
     best, second = order[:2]
     if points[machine] == points[best]:
-        return Recognition(control_named(machine), True, ("the machine",))
+        return Recognition(own, True, ("the machine",))
     other = control_named(second) if points[best] - points[second] < MARGIN else None
     return Recognition(control_named(best), False, found[best][1][:NAMED], other)
 
