@@ -252,6 +252,7 @@ def test_a_mistyped_file_word_or_name_is_named_as_such(tmp_path: Path) -> None:
             "must be one of 'contour', 'forward', 'pocket': did you mean contour?",
         ),
         (("example", "contuor", tmp_path / "c"), "example contuor: not known; did you mean contour?"),
+        (("example", "contuor"), "example contuor: not known; did you mean contour?"),
         (("machines", "tormach-400"), "the nearest is tormach-440"),
     ):
         code, _, said = call(*words)

@@ -28,12 +28,13 @@ def example(
     """Copy an example; without a name, list them."""
 
     def work() -> int:
-        from chipload.examples import copy_example, example_titles
+        from chipload.examples import check_name, copy_example, example_titles
 
         if name is None:
             for key, title in example_titles().items():
                 show(f"{key:12} {title}")
             return 0
+        check_name(name)
         if folder is None:
             raise InputError(f"example {name}: the folder is missing: use chipload example {name} DIR")
         show(f"copied: chipload run {copy_example(name, folder) / 'job.toml'} --out result")

@@ -16,6 +16,20 @@ def example_titles() -> dict[str, str]:
     return {f.name: f.joinpath("README.md").read_text("utf-8").splitlines()[0].lstrip("# ") for f in folders}
 
 
+def check_name(name: str) -> None:
+    """Refuse a name that no example has.
+
+    Raises
+    ------
+    InputError
+        There is no such example.
+    """
+    known = list(example_titles())
+    if name not in known:
+        near = nearest(name, known)
+        raise InputError(f"example {name}: not known; did you mean {near}? (known: {', '.join(known)})")
+
+
 def copy_example(name: str, folder: str | Path) -> Path:
     """Copy an example into a new or empty folder and return that folder.
 
@@ -24,10 +38,7 @@ def copy_example(name: str, folder: str | Path) -> Path:
     InputError
         There is no such example, the folder holds something, or it cannot be written.
     """
-    known = list(example_titles())
-    if name not in known:
-        near = nearest(name, list(known))
-        raise InputError(f"example {name}: not known; did you mean {near}? (known: {', '.join(known)})")
+    check_name(name)
     target = Path(folder)
     try:
         if target.exists() and (not target.is_dir() or any(target.iterdir())):
