@@ -114,8 +114,8 @@ def test_a_sinumerik_program():
     ("block", "message"),
     [
         ("CYCLE83(1,2,3)", "CYCLE83: RTP, RFP and DP or DPR must be given"),
-        ("IF R1>0", "line 1: IF: ENDIF is missing"),
-        ("ENDWHILE", "line 1: ENDWHILE has no WHILE before it"),
+        ("IF R1>0", "IF: ENDIF is missing"),
+        ("ENDWHILE", "ENDWHILE has no WHILE before it"),
         ("AB: G1 X1 F1\nGOTOB AB", "more than 400002 blocks: a loop does not end, or most_blocks must be raised"),
         ("G33 Z10 K1", "G33: the spindle does not turn: start it by M3 or M4"),
     ],

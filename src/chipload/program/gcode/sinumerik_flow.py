@@ -85,6 +85,7 @@ class Statements:
     partner : closing line of each opening line, and opening line of each closing line
     other : line of ELSE by line of its IF
     left : remaining repeats, by line
+    wrong : what is wrong with a statement that is not closed, or that closes nothing, by line
     """
 
     at: dict[int, Statement] = field(default_factory=dict)
@@ -92,16 +93,11 @@ class Statements:
     partner: dict[int, int] = field(default_factory=dict)
     other: dict[int, int] = field(default_factory=dict)
     left: dict[int, int] = field(default_factory=dict)
+    wrong: dict[int, str] = field(default_factory=dict)
 
 
 def statements_of(source: Source) -> Statements:
-    """Jumps, loops and labels of a text.
-
-    Raises
-    ------
-    InputError
-        One is not closed, or closes nothing.
-    """
+    """Jumps, loops and labels of a text."""
     out, open_ones = Statements(), list[int]()
     for k, raw in enumerate(source.lines):
         body = _plain(raw)
@@ -119,8 +115,8 @@ def statements_of(source: Source) -> Statements:
         if one.word in CLOSES or one.word == "ELSE":
             wanted = CLOSES.get(one.word, "IF")
             if not open_ones or out.at[open_ones[-1]].word != wanted:
-                raise InputError(f"line {k + 1}: {one.word} has no {wanted} before it")
-            if one.word == "ELSE":
+                out.wrong[k] = f"{one.word} has no {wanted} before it"
+            elif one.word == "ELSE":
                 out.other[open_ones[-1]] = k
             else:
                 first = open_ones.pop()
@@ -129,10 +125,11 @@ def statements_of(source: Source) -> Statements:
                     out.partner[out.other[first]] = k
         elif one.opens:
             open_ones.append(k)
-    if open_ones:
-        word = out.at[open_ones[-1]].word
-        ends = next(end for end, begin in CLOSES.items() if begin == word)
-        raise InputError(f"line {open_ones[-1] + 1}: {word}: {ends} is missing")
+    for k in open_ones:
+        ends = next(end for end, begin in CLOSES.items() if begin == out.at[k].word)
+        out.wrong[k] = f"{out.at[k].word}: {ends} is missing"
+        if k in out.other:
+            out.wrong[out.other[k]] = f"ELSE: {ends} is missing"
     return out
 
 
@@ -155,6 +152,12 @@ def flow_step(flow: Flow, raw: str, value: Value) -> bool:
     one = some.at.get(flow.line)
     if one is None:
         return False
+    if flow.line in some.wrong:
+        if not flow.lenient:
+            raise InputError(some.wrong[flow.line])
+        flow.c.leave_out("nc-jump", f"{some.wrong[flow.line]}: the statement is left out")
+        flow.line += 1
+        return True
     try:
         flow.line = _next(flow, some, one, value)
     except NotReadError as error:

@@ -182,8 +182,11 @@ class _Blocks:
         if re.match(r"FN\s*\d+", block):
             try:
                 return self.flow.function(block, at)
-            except NotKnownError as err:
-                self.s.unproven("heidenhain-jump", f"{err} [jump not taken: {block[:60]}]")
+            except InputError as err:
+                if not (self.lenient or isinstance(err, NotKnownError)):
+                    raise
+                jump = "jump not taken" if "GOTO" in block else "left out"
+                self.s.unproven("heidenhain-jump", f"{err} [{jump}: {block[:60]}]")
                 return at + 1
         if re.match(r"END PGM\b|END\b", block):
             back = self.flow.end()
