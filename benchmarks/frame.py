@@ -1,19 +1,25 @@
 """Processor time and memory of the distortion of a frame: 120 x 60 x 30 mm, two pockets, walls and rib 1.5 mm, floor 2.
 
     python benchmarks/frame.py [CELL_MM ...]      8 and 12, if none are stated
+    python benchmarks/frame.py --proof FILE       the jobs that `chipload init` drafts of a STEP file, run one by one
 
 Measured for each size of cells: a plan with a release before finishing, its flatness and distortion. Then the whole
 search of a job: the part at three heights in a plate of 40 mm, either side first, either way up, with and without a
 release before its faces are finished. The stress is the M of stretched plate, 20 MPa.
+
+The proof runs the commands of a user: `chipload init`, then `chipload run --accept` of each job; of each the exit code,
+the processor and wall time and the greatest memory, and the first sentence of its verdict.
 """
 
 from __future__ import annotations
 
+import os
 import resource
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from time import process_time
+from time import monotonic, process_time
 
 import numpy as np
 import trimesh
@@ -84,8 +90,39 @@ def print_search(part: trimesh.Trimesh) -> None:
     print(f"of the cells: {100.0 * done.cell_error:.2f} %")
 
 
+def print_command(name: str, words: list[str]) -> float:
+    """A command of chipload: its exit code, times, memory and verdict; return its processor time [s]."""
+    began = monotonic()
+    with tempfile.TemporaryFile("w+") as said:
+        process = subprocess.Popen([sys.executable, "-m", "chipload", *words], stdout=said, stderr=subprocess.DEVNULL)
+        _, status, used = os.wait4(process.pid, 0)
+        said.seek(0)
+        verdict = next((line.split(": ")[0] for line in said if line.startswith(("Holds", "Exceeds", "Unproven"))), "-")
+    busy = used.ru_utime + used.ru_stime
+    code = os.waitstatus_to_exitcode(status)
+    print(
+        f"{name}: exit {code}, {busy:.0f} s of processor time, {monotonic() - began:.0f} s, "
+        f"{used.ru_maxrss / 1024.0:.0f} MiB, {verdict}",
+        flush=True,
+    )
+    return busy
+
+
+def print_proof(file: Path) -> None:
+    """The whole proof of a part by the jobs that a draft has."""
+    with tempfile.TemporaryDirectory() as folder:
+        whole = print_command("init", ["init", str(file), folder])
+        for job in sorted(Path(folder).glob("*.toml")):
+            out = Path(folder) / "result" / job.stem
+            whole += print_command(job.stem, ["run", str(job), "--accept", "--out", str(out)])
+    print(f"whole: {whole:.0f} s of processor time")
+
+
 def main() -> None:
     """Print all measurements."""
+    if sys.argv[1:2] == ["--proof"]:
+        print_proof(Path(sys.argv[2]).resolve())
+        return
     part = frame()
     for cell in [float(a) for a in sys.argv[1:]] or [8.0, 12.0]:
         print_plan(part, cell)
