@@ -1,6 +1,7 @@
 """Processor time and memory of the distortion of a frame: 120 x 60 x 30 mm, two pockets, walls and rib 1.5 mm, floor 2.
 
     python benchmarks/frame.py [CELL_MM ...]      8 and 12, if none are stated
+    python benchmarks/frame.py --state [CELL_MM]  the finished frame, clamped and factored, in cells of 3 mm
     python benchmarks/frame.py --proof FILE       the jobs that `chipload init` drafts of a STEP file, run one by one
 
 Measured for each size of cells: a plan with a release before finishing, its flatness and distortion. Then the whole
@@ -22,6 +23,7 @@ from pathlib import Path
 from time import monotonic, process_time
 
 import numpy as np
+import shapely
 import trimesh
 
 from chipload.jobs import job_of, run_job
@@ -29,7 +31,11 @@ from chipload.jobs.distortion.plans import Clamping, MillingPlan
 from chipload.jobs.distortion.release import plate_release
 from chipload.jobs.distortion.shapes import SideCut
 from chipload.jobs.distortion.surface import part_surface
-from chipload.structure.cells.workpiece import Elastic
+from chipload.stock.layers import LayeredStock
+from chipload.structure.cells.clamp import Clamp
+from chipload.structure.cells.moments import StockRegion
+from chipload.structure.cells.thickness import cells_over
+from chipload.structure.cells.workpiece import Elastic, cell_workpiece, line_compliances
 from chipload.structure.stress_profile import m_shape, odd_shape
 
 SIZE, WALL, FLOOR = (120.0, 60.0, 30.0), 1.5, 2.0
@@ -90,6 +96,27 @@ def print_search(part: trimesh.Trimesh) -> None:
     print(f"of the cells: {100.0 * done.cell_error:.2f} %")
 
 
+def print_state(part: trimesh.Trimesh, cell: float) -> None:
+    """The finished frame on its underside in cells that a job takes: time of a state, its factors, 63 contact lines."""
+    block = LayeredStock.block((0.0, 0.0, 0.0), SIZE, cell, 60.0)
+    last = LayeredStock.of_mesh(part, cell, 60.0)
+    held = Clamp("clamp", StockRegion(shapely.box(-1.0, -1.0, 121.0, 61.0), 0.0, 1e-3), np.ones(3, dtype=np.bool_))
+    grid = cells_over(block, last, cell)[0]
+    x = np.linspace(5.0, SIZE[0] - 5.0, 63)
+    lines = np.stack([np.column_stack([x, 0.0 * x + WALL, 0.0 * x + z]) for z in (SIZE[2] - 4.0, SIZE[2])], axis=1)
+    for again in (False, True):  # the first reads compiled loops
+        began = process_time()
+        work = cell_workpiece(last, grid, Elastic(71_700.0, 0.33), [held])
+        made = process_time()
+        found = line_compliances(work, lines)
+        if again:
+            print(
+                f"state in cells of {grid.widest:.3g} mm: {3 * len(work.modes)} unknowns, {made - began:.2f} s, "
+                f"factors {8e-6 * work.factors.entries:.0f} MB; 63 contact lines {process_time() - made:.2f} s, "
+                f"at most {1e3 * float(found[:, 1, 1, 1].max()):.3f} um/N"
+            )
+
+
 def print_command(name: str, words: list[str]) -> float:
     """A command of chipload: its exit code, times, memory and verdict; return its processor time [s]."""
     began = monotonic()
@@ -122,6 +149,9 @@ def main() -> None:
     """Print all measurements."""
     if sys.argv[1:2] == ["--proof"]:
         print_proof(Path(sys.argv[2]).resolve())
+        return
+    if sys.argv[1:2] == ["--state"]:
+        print_state(frame(), float(sys.argv[2]) if len(sys.argv) > 2 else 3.0)
         return
     part = frame()
     for cell in [float(a) for a in sys.argv[1:]] or [8.0, 12.0]:

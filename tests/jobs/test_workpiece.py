@@ -191,6 +191,19 @@ def test_what_cannot_be_clamped_is_refused(job_file, old, new, message):
         check(loaded(path))
 
 
+def test_the_additional_run_and_the_states_are_in_the_estimate(job_file):
+    with_states = check(loaded(job_file))[0][-1]
+    text = re.sub(r"\[workpiece\].*?\[\[operation", "[[operation", job_file.read_text(), flags=re.DOTALL)
+    job_file.write_text(text.replace("deflection_workpiece_um", "force_n"))
+    rigid = check(loaded(job_file))[0][-1]
+    (steps, least, most), (once, first, last) = (
+        [int(n) for n in re.findall(r"(\d+) (?:steps|to|s$)", line)] for line in (with_states, rigid)
+    )
+    assert steps == 2 * once
+    assert least > first
+    assert most > last
+
+
 def test_a_limit_needs_a_workpiece(job_file):
     text = job_file.read_text()
     job_file.write_text(re.sub(r"\[workpiece\].*?\[\[operation", "[[operation", text, flags=re.DOTALL))

@@ -20,6 +20,7 @@ from chipload.checking.partial import PartialLimits
 from chipload.checking.preparation import Bodies, bodies_of, resolution_of, time_rows
 from chipload.checking.program_sequence import ProgramSequence
 from chipload.checking.stability import stability_of, watch_of
+from chipload.checking.state_times import state_times
 from chipload.checking.stiffness import deflection_watch, stiffness_of, watched_columns, with_columns
 from chipload.checking.stock_check import check_stock
 from chipload.checking.tap_torque import tap_torques
@@ -68,8 +69,14 @@ SHARE = 0.2 / 3.0
 
 def simulation_estimate(inputs: CheckInputs, reading: ProgramReading, stock: LayeredStock, passes: int = 1) -> str:
     """Return a line on time and memory of a simulation; inputs that cannot be used are refused."""
-    bodies = bodies_of(inputs, reading, stock)
-    return estimate(passes * bodies.steps, len(reading.program), *_step_times(inputs, bodies.program, stock))
+    bodies, workpiece = bodies_of(inputs, reading, stock), inputs.elasticity.workpiece
+    quick, slow = _step_times(inputs, bodies.program, stock)
+    if workpiece is None:
+        return estimate(passes * bodies.steps, len(reading.program), quick, slow)
+    # an additional run finds where the program cuts
+    steps = (passes + 1) * bodies.steps
+    more = state_times(workpiece, stock, inputs.surroundings.part)
+    return estimate(steps, len(reading.program), quick, slow, more=more)
 
 
 def _step_times(inputs: CheckInputs, program: Program, stock: LayeredStock) -> tuple[float, float]:

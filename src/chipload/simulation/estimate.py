@@ -27,10 +27,18 @@ LEANING, UPRIGHT = (0.6e-3, 8e-3), 0.1e-3
 FLAT, ROUND, TAPERED = 4e-3, 10e-3, 28e-3
 
 
-def estimate(steps: int, motions: int, quick: float = QUICK, slow: float = SLOW, coarse: bool = True) -> str:
+def estimate(
+    steps: int,
+    motions: int,
+    quick: float = QUICK,
+    slow: float = SLOW,
+    coarse: bool = True,
+    more: tuple[float, float] = (0.0, 0.0),
+) -> str:
     """Return steps, memory and time of a simulation as a sentence; ``quick`` and ``slow`` are times of a step [s].
 
-    With ``coarse``, a long estimate ends with how to get a first result.
+    With ``coarse``, a long estimate ends with how to get a first result. ``more`` is the least and greatest time [s] of
+    what is calculated besides the steps.
 
     >>> estimate(200_000, 100_000)
     'estimate: 200000 steps, 610 MB of memory, 5 to 57 min; for a first result: run --coarse'
@@ -39,7 +47,7 @@ def estimate(steps: int, motions: int, quick: float = QUICK, slow: float = SLOW,
     >>> estimate(28, 8)
     'estimate: 28 steps, 350 MB of memory, 4 to 12 s'
     """
-    low, high = START[0] + quick * steps, START[1] + slow * steps
+    low, high = START[0] + more[0] + quick * steps, START[1] + more[1] + slow * steps
     unit, name = (60.0, "min") if high > 300.0 else (1.0, "s")
     least = f"{low / unit:.0f}" if low >= unit else f"{low:.0f} s"
     hint = "; for a first result: run --coarse" if coarse and high > 300.0 else ""

@@ -27,6 +27,8 @@ LINES = 160
 #: worst steps that are solved in the states just before and after them: so many pairs of states, and steps with at
 #: least this share of the greatest deflection
 TIGHT, NEAR = 6, 0.7
+#: states that are solved first: before all, at thirds of the volume, after all
+FIRST = 4
 #: number of worst steps that are reported
 WORST = 12
 

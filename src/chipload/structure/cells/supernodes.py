@@ -8,9 +8,9 @@ sums of A and of what the supernodes below leave, in blocks A_11 (n, n), A_21 (b
 
 and A_22 - L_21 L_21^T goes on to the supernode of the border's first unknown.
 
-All work is dense algebra on a few hundred rows at once, and L is kept once, which takes a third of the time and a
-quarter of the memory of SuperLU in the same order (docs/design/workpiece.md). Right-hand sides are solved together;
-supernodes without a force are left out, and in the substitution backwards those on which no wanted row depends.
+All work is dense algebra on a few hundred rows at once, and L is kept once: a quarter of the time and less than half of
+the memory of SuperLU in the same order (docs/design/workpiece.md). Right-hand sides are solved together; supernodes
+without a force are left out, and in the substitution backwards those on which no wanted row depends.
 
 Reference: [Duff1983].
 """

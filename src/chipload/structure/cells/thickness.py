@@ -117,7 +117,7 @@ def cells_over(
     size = GOOD * wall
     while True:
         grid = grid_on_faces(first, faces, min(size, side / LEAST_CELLS), order)
-        count = max(_count(stock, grid) for stock in (first, last))
+        count = max(count_modes(stock, grid) for stock in (first, last))
         if count <= WANTED_MODES or (size >= MOST * wall and count <= MOST_MODES):
             return grid, wall
         if size >= MOST * wall:
@@ -128,8 +128,8 @@ def cells_over(
         size = min(1.15 * size, MOST * wall)
 
 
-def _count(stock: LayeredStock, grid: CellGrid) -> int:
-    """Modes of a stock."""
+def count_modes(stock: LayeredStock, grid: CellGrid) -> int:
+    """Modes of a stock in cells, three directions each; at most twice :data:`MOST_MODES`."""
     share = shares(stock_moments(stock, CellGrid(grid.planes, 1)))
     if int((share > LEAST_SHARE).sum()) > 2 * MOST_MODES:
         return 2 * MOST_MODES
