@@ -279,7 +279,7 @@ def _sections_of(path: Path, scale: float, columns: str | None, order: tuple[int
         if columns is not None:
             raise InputError(f"{path}: columns {columns}: must not be stated: the table names its own")
         return [_finite(p * scale, path) for p in table]
-    out = []
+    out: list[Floats] = []
     stated = "X Y Z" if path.suffix.lower() in (".curve", ".crv") else columns
     for names, rows in _blocks_of_blade(path, body):
         p = np.array(rows)
