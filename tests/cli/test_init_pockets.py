@@ -75,7 +75,7 @@ def test_the_jobs_of_a_frame(drafted: tuple[Path, str]) -> None:
         "result/1-pockets/1-pocket.ngc", "result/2-roughing/stock.npz",
     )  # fmt: skip
     assert walls["cutter"] == [plan["cutter"][1]]
-    assert walls["workpiece"]["cell_mm"] == 2.0 * 1.8
+    assert walls["workpiece"]["cell_mm"] == 2.4 * 1.8
     assert (walls["workpiece"]["clamp"][0]["face"], walls["limits"]["form_error_um"]) == ("z-", 50.0)
     assert release["residual_stress"]["source"].startswith("an example")
     for name in ("1-pockets.toml", "4-distortion.toml"):
