@@ -102,7 +102,7 @@ MOVES_FLOOR = {
 #: the same if all cutters are flat mills with a straight flank: slices are exact, and what is left are places between
 #: the steps
 FLAT_FLOOR = {
-    "force_n": 0.01, "torque_nm": 0.01, "torque_mean_nm": 0.005, "power_w": 0.005, "chip_max_mm": 0.01,
+    "force_n": 0.007, "torque_nm": 0.007, "torque_mean_nm": 0.005, "power_w": 0.005, "chip_max_mm": 0.01,
     "force_normal_n": 0.01, AXIAL: 0.01,
 }  # fmt: skip
 #: the same if an axis leans, for any cutter
