@@ -24,17 +24,19 @@ function unrolled(doc: Document, removal: Removal): Uint16Array {
 
 /** (4q, 4) on which side of its quad each corner lies, along X, Y and Z. Where a level or upright quad ends within the side of another,
     specks of what is behind show between the two, unless each is drawn half a pixel larger; the quads of other faces meet at corners. */
-function outward(position: Float32Array): Int8Array {
-  const out = new Int8Array(position.length / 3 * 4), off = [0, 0, 0, 0];
-  for (let q = 0; q < position.length; q += 12) {
+function outward(corners: Uint16Array): Int8Array {
+  const out = new Int8Array(corners.length / 3 * 4);
+  for (let q = 0, to = 0; q < corners.length; q += 12, to += 16) {
     let flat = false;
     for (let i = 0; i < 3; i++) {
-      const middle = (position[q + i] + position[q + 3 + i] + position[q + 6 + i] + position[q + 9 + i]) / 4;
-      for (let c = 0; c < 4; c++) off[c] = position[q + 3 * c + i] - middle;
-      if (off.every((v) => Math.abs(v) < 1e-5 * (1 + Math.abs(middle)))) flat = true;
-      else for (let c = 0; c < 4; c++) out[4 * (q / 3 + c) + i] = Math.sign(off[c]) * 127;
+      const a = corners[q + i], b = corners[q + 3 + i], c = corners[q + 6 + i], d = corners[q + 9 + i], sum = a + b + c + d;
+      if (a === b && a === c && a === d) { flat = true; continue; }
+      out[to + i] = 4 * a > sum ? 127 : 4 * a < sum ? -127 : 0;
+      out[to + 4 + i] = 4 * b > sum ? 127 : 4 * b < sum ? -127 : 0;
+      out[to + 8 + i] = 4 * c > sum ? 127 : 4 * c < sum ? -127 : 0;
+      out[to + 12 + i] = 4 * d > sum ? 127 : 4 * d < sum ? -127 : 0;
     }
-    if (!flat) out.fill(0, 4 * q / 3, 4 * q / 3 + 16);
+    if (!flat) out.fill(0, to, to + 16);
   }
   return out;
 }
@@ -67,7 +69,7 @@ export class Stock {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
     geometry.setAttribute("birth", new THREE.BufferAttribute(birth, 1));
-    geometry.setAttribute("outward", new THREE.BufferAttribute(outward(position), 4, true));
+    geometry.setAttribute("outward", new THREE.BufferAttribute(outward(corners), 4, true));
     geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(count * 6), 1).setUsage(THREE.DynamicDrawUsage));
     geometry.computeBoundingSphere();
     const material = new THREE.MeshStandardMaterial({
