@@ -183,6 +183,7 @@ def chips(
     line = np.empty((N + 2, 4))
     radii = np.zeros(N)
     cut = np.zeros((math.ceil(8.0 / widest), N, N, 3))
+    ends = np.zeros((len(cut) + 1, 2))
     # typed: a literal would compile what it is passed to twice
     at: Any = np.int64(0)
     known: Any = np.int64(-1)
@@ -263,14 +264,29 @@ def chips(
             first = p - reach if cusp_p and not whole else p
             last = q + reach if cusp_q and not whole else q
             parts = max(1, math.ceil((last - first) / widest - 1e-9))
-            for part in range(parts):
+            for part in range(parts + 1):
                 x = first + (last - first) * part / parts
-                y = first + (last - first) * (part + 1) / parts
-                if y - x > NONE:
-                    sm = math.sin(0.5 * (x + y))
-                    cm = math.cos(0.5 * (x + y))
-                    sw = math.sin(0.5 * (y - x))
-                    cw = math.cos(0.5 * (y - x))
+                # the ends of the range are known
+                if part == 0 and first == p:
+                    ends[part, 0] = sp
+                    ends[part, 1] = cp
+                elif part == parts and last == q:
+                    ends[part, 0] = sq
+                    ends[part, 1] = cq
+                else:
+                    ends[part, 0] = math.sin(x)
+                    ends[part, 1] = math.cos(x)
+            width = (last - first) / parts
+            for part in range(parts):
+                if width > NONE:
+                    # middle and half width of the piece from its ends, whose sum lies along the middle
+                    sm = ends[part, 0] + ends[part + 1, 0]
+                    cm = ends[part, 1] + ends[part + 1, 1]
+                    both = math.sqrt(sm * sm + cm * cm)
+                    sm /= both
+                    cm /= both
+                    cw = 0.5 * both
+                    sw = sm * ends[part, 1] - cm * ends[part, 0]
                     for j in range(1 if alike else N):
                         for m in range(most):
                             past = f * turns[j, m]
@@ -309,39 +325,35 @@ def chips(
                             lines = along_wall(line, lines, cp, sine, rho, radii[j])
                         if wall_q and part == parts - 1:
                             lines = along_wall(line, lines, cq, sine, rho, radii[j])
+                        sx = ends[part, 0]
+                        cx = ends[part, 1]
+                        if x == lo and lo != first:
+                            sx = math.sin(x)
+                            cx = math.cos(x)
+                        sy = ends[part + 1, 0]
+                        cy = ends[part + 1, 1]
+                        if y == hi and hi != last:
+                            sy = math.sin(y)
+                            cy = math.cos(y)
                         at = lowest(
-                            line,
-                            lines,
-                            x,
-                            y,
-                            s0,
-                            s1,
-                            turned,
-                            st,
-                            ct,
-                            -1 if alike else j,
-                            r,
-                            out,
-                            own,
-                            parent,
-                            before,
-                            at,
-                        )
+                            line, lines, x, y, sx, cx, sy, cy, s0, s1, turned, st, ct, -1 if alike else j, r, out, own,
+                            parent, before, at,
+                        )  # fmt: skip
         room[i + 1] = at
     return at
 
 
 @njit(cache=True, nogil=True)
-def lowest(line, lines, x, y, s0, s1, turned, st, ct, tooth, row, out, own, parent, before, at):
+def lowest(
+    line, lines, x, y, sx, cx, sy, cy, s0, s1, turned, st, ct, tooth, row, out, own, parent, before, at
+):  # fmt: skip
     """Write the ranges in x .. y [rad] of the lower envelope of lines where it is positive; next number.
+
+    ``sx``, ``cx``, ``sy``, ``cy``: sines and cosines of x and y.
 
     From each corner on the lowest line stays so until another crosses it downwards. A line is not looked at whose
     distance at both ends is more than it can bend between them.
     """
-    sx = math.sin(x)
-    cx = math.cos(x)
-    sy = math.sin(y)
-    cy = math.cos(y)
     best = 0
     low = math.inf
     for m in range(lines):
