@@ -99,7 +99,7 @@ class CellWorkpiece:
     order : (3 u,) int
     place : (3 u,) int, the inverse of ``order``
     volume : [mm^3] of the material that is held
-    loose : [mm^3] of material without a connection to a clamp, which is left out
+    loose : [mm^3] of pieces that the clamps do not hold against every rigid motion, which are left out
     clamped : [mm^3] that each clamp holds
     sections : of the stock, on which forces act
     mass : (3 u, 3 u) sparse [t]; None: the density is not known
@@ -144,7 +144,9 @@ def cell_workpiece(
     springs = clamp_stiffness(clamps, stock, grid, modes, elastic.modulus, first)
     pieces, count = scipy.ndimage.label(share > LEAST_SHARE)
     if count > 1:
-        kept = np.isin(pieces, np.unique(pieces[springs.cells & (pieces > 0)]))
+        touched = np.unique(pieces[springs.cells & (pieces > 0)]).tolist()
+        fixed = [k for k in touched if _is_held(clamps, stock, grid, np.where(pieces == k, share, 0.0), elastic)]
+        kept = np.isin(pieces, fixed or touched)
         loose = float((share * grid.volumes)[~kept].sum())
         if loose > 0.0:
             share = np.where(kept, share, 0.0)
@@ -157,6 +159,17 @@ def cell_workpiece(
         grid, modes, share, K, factors, order, place, volume, loose, springs.volumes,
         StockSections(stock), None if elastic.density is None else mass(grid, modes, moments, elastic.density),
     )  # fmt: skip
+
+
+def _is_held(
+    clamps: Sequence[Clamp], stock: LayeredStock, grid: CellGrid, share: NDArray[np.float64], elastic: Elastic
+) -> bool:
+    """Whether the clamps leave a piece no rigid motion; ``share`` of each cell that it fills."""
+    try:
+        clamp_stiffness(clamps, stock, grid, modes_of(grid, share), elastic.modulus)
+    except InputError:
+        return False
+    return True
 
 
 def factor_modes(
