@@ -8,7 +8,7 @@ CASES = (
     Case(
         "rapid-down", "a rapid goes down into the block", replaced("G0 Z-2", "G0 X30\nG0 Z-2"), "exceeds", "rapid-cuts"
     ),
-    Case("no-spindle", "the spindle is never started", replaced("S6000 M3\n", ""), "refused", "spindle at rest"),
+    Case("no-spindle", "the spindle is never started", replaced("S6000 M3\n", ""), "exceeds", "machine-spindle-off"),
     Case("spindle-backwards", "M4 with a right-hand cutter", replaced("M3", "M4"), "exceeds", "spindle-reversed"),
     Case("left-hand", "M3 with a left-hand cutter", cutter(left_hand=True), "exceeds", "spindle-reversed"),
     Case("no-feed", "no feed is stated", replaced(" F900", ""), "unproven", "nc-not-read"),

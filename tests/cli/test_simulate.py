@@ -299,7 +299,6 @@ def test_check_reads_the_stock_and_cuts_nothing(job: Path) -> None:
         ("[limits]", "[stiffness]\nspindle_n_um = \"stiff\"\n[limits]",
          "stiffness.spindle_n_um = 'stiff': must be a number, or inf where it is rigid"),
         ("[limits]", "[stiffness]\nspindle_n_um = 0.0\n[limits]", "stiffness.spindle_n_um = 0: must be above 0"),
-        ("S3000", "S0", "cuts with the spindle at rest"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_one_line(job: Path, tmp_path: Path, old: str, new: str, said: str) -> None:

@@ -62,7 +62,7 @@ PROGRAMS = {
         "linuxcnc_3axis/cds.ngc",
         {"dialect": "linuxcnc", "low": [0.0, 0.0, 0.0], "high": [101.6, 101.6, 50.8], "layer": 1.0, "diameter": 6.35,
          "flute": 25.0, "material": "al7075-t6", "force": 480.0},
-        (686.6, 707.9, 591.5, 466.6),
+        (686.6, 695.7, 591.5, 466.6),
     ),
     "compass": (
         "camotics/compass/top.ngc",

@@ -160,8 +160,19 @@ def test_what_is_watched_becomes_columns_of_the_steps_that_cut() -> None:
 def test_what_is_wrong_with_a_program_is_said() -> None:
     with pytest.raises(InputError, match=r"tool 1: no \[\[cutter\]\] has this number: state one beside 2"):
         remove(straight([-10, 0, -3], [30, 0, -3]), block(), {2: MILL}, ENERGY, FINE)
-    with pytest.raises(InputError, match="cuts with the spindle at rest: start it"):
-        remove(straight([-10, 0, -3], [30, 0, -3], spindle=0.0), block(), {1: MILL}, ENERGY, FINE)
+
+
+def test_a_feed_with_the_spindle_at_rest_is_named() -> None:
+    """It removes what its body does, and has no loads; the rest of the program is simulated."""
+    rest = remove(straight([-10, 0, -3], [30, 0, -3], spindle=0.0), block(), {1: MILL}, ENERGY, FINE)
+    cut = remove(straight([-10, 0, -3], [30, 0, -3]), block(), {1: MILL}, ENERGY, FINE)
+    assert [str(f) for f in rest.findings] == [
+        "cuts with the spindle at rest: start it (M3 S) before the cut (machine-spindle-off)"
+    ]
+    assert cut.findings == ()
+    assert rest.volume_after == pytest.approx(cut.volume_after, rel=1e-12)
+    assert not rest.columns["force_n"].any()
+    assert cut.columns["force_n"].any()
 
 
 def test_the_same_in_another_place_and_turned_by_a_quarter() -> None:

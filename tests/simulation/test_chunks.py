@@ -230,9 +230,9 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
 
 def test_refused_input_leaves_nothing(tmp_path: Path) -> None:
     program = some_rows()
-    resting = replace(program, spindle=np.where(np.arange(len(program)) > 12, 0.0, program.spindle))
-    with pytest.raises(InputError, match="cuts with the spindle at rest"):
-        run(tmp_path / "u", resting)
+    unknown = replace(program, tool=np.where(np.arange(len(program)) > 12, 9, program.tool))
+    with pytest.raises(InputError, match="tool 9: no"):
+        run(tmp_path / "u", unknown)
     assert not (tmp_path / "u").exists()
 
 

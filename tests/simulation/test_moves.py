@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_along
 from chipload.cutting.material import Material, material_named
-from chipload.errors import Cancelled, InputError
+from chipload.errors import Cancelled
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
 from chipload.simulation.accuracy import COMPARED, MOVES_FLOOR, WITH_FORCE
@@ -128,9 +128,9 @@ def test_a_rapid_through_material_is_found() -> None:
     assert [f.code for f in run(program).findings] == ["rapid-cuts"]
 
 
-def test_a_spindle_at_rest_is_refused() -> None:
-    with pytest.raises(InputError, match="cuts with the spindle at rest"):
-        run(path([[-8.0, 5.0, -1.0], [20.0, 5.0, -1.0]], speed=0.0))
+def test_a_spindle_at_rest_is_found() -> None:
+    found = run(path([[-8.0, 5.0, -1.0], [20.0, 5.0, -1.0]], speed=0.0)).findings
+    assert [f.code for f in found] == ["machine-spindle-off"]
 
 
 def leaning() -> Program:

@@ -22,6 +22,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import knowledge_text
 from chipload.errors import Finding, Severity
 from chipload.program.block_delete import with_block_delete
+from chipload.program.check import SPINDLE_OFF
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, in_memory
 from chipload.result.limits import Columns
 from chipload.simulation.placement import nothing_cut, stock_placement
@@ -177,7 +178,9 @@ def findings_of(program: ProgramResult, simulation: SimulationResult) -> tuple[F
 
 def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
     """Return findings of the simulation: rapids in material, collisions, chips beyond the range of the coefficients."""
-    out = [as_exceeding(f) if f.code == "rapid-cuts" else f for f in simulation.removal.findings]
+    # cuts with the spindle at rest are violations of the reading
+    own = [f for f in simulation.removal.findings if f.code != SPINDLE_OFF]
+    out = [as_exceeding(f) if f.code == "rapid-cuts" else f for f in own]
     out += collision_findings(simulation.collisions.found)
     known = {(f.code, f.line) for f in out}
     out += [f for f in simulation.collisions.stock.findings if f.code != "rapid-cuts" or (f.code, f.line) not in known]

@@ -18,6 +18,9 @@ from chipload.program.motions import bounds, is_arc
 from chipload.program.program import DWELL, LINE, RAPID, Program
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
+#: code of a finding on cuts with the spindle at rest
+SPINDLE_OFF = "machine-spindle-off"
+
 
 def check_program(
     program: Program, machine: Machine, travel: bool = True, probes: Sequence[int] = ()
@@ -79,9 +82,7 @@ def check_program(
     report("machine-spindle", turning & (over > 1.0 + 1e-12), over, text, rpm_from_rad_s(1.0) * speed)
     none = np.zeros(len(program))
     cutting = cuts & ~np.isin(program.line, probes)
-    report(
-        "machine-spindle-off", cutting & ~turning, none, "cuts with the spindle at rest: state a spindle speed", none
-    )
+    report(SPINDLE_OFF, cutting & ~turning, none, "cuts with the spindle at rest: state a spindle speed", none)
     tilt = np.degrees(np.arccos(np.clip(program.axis[:, 2], -1.0, 1.0)))
     tilted = (np.hypot(program.axis[:, 0], program.axis[:, 1]) > 1e-9) | (program.axis[:, 2] < 0.0)
     text = f"axis tilted by {{:g}} deg: machine {machine.name} has three axes"

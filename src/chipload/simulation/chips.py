@@ -19,8 +19,9 @@ from chipload.cutting.band import deviations
 from chipload.cutting.material import Material
 from chipload.errors import Finding, InputError
 from chipload.number_text import number_text
+from chipload.program.check import SPINDLE_OFF
 from chipload.program.motions import lengths
-from chipload.program.program import Program
+from chipload.program.program import RAPID, Program
 from chipload.progress import Progress, silent
 from chipload.simulation.accuracy import (
     COMPARED,
@@ -122,7 +123,7 @@ def remove(
     Raises
     ------
     InputError
-        A tool has no cutter, an axis lies or looks down at the stock, a cut is made with the spindle at rest.
+        A tool has no cutter, an axis lies or looks down at the stock.
 
     Notes
     -----
@@ -376,8 +377,14 @@ def removal_of(
         sd = deviations(sums.basis / sums.cut_s, material) if sums.cut_s > 0.0 else np.zeros(4)
         band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     # rapids that cut more than films
-    found = tuple(Finding("rapid-cuts", line, "a rapid goes through material") for line in sums.rapids)
-    return Removal(columns, sums.before, stock.volume(), band, None, found, program.labels, cuts)
+    resting = set(program.line[(program.motion != RAPID) & (program.spindle == 0.0)].tolist())
+    rapids = [line for line in sums.rapids if line not in resting]
+    found = [Finding("rapid-cuts", line, "a rapid goes through material") for line in rapids]
+    if lines := [line for line in sums.rapids if line in resting]:
+        more = f" in {len(lines)} lines" if len(lines) > 1 else ""
+        text = f"cuts with the spindle at rest{more}: start it (M3 S) before the cut"
+        found.append(Finding(SPINDLE_OFF, lines[0], text))
+    return Removal(columns, sums.before, stock.volume(), band, None, tuple(found), program.labels, cuts)
 
 
 def stack_blocks(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:

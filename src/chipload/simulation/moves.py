@@ -322,7 +322,7 @@ def remove_by_moves(
     MaterialAboveFlutes
         There is material above the flutes, and the run does not ask for the shank.
     InputError
-        A cut is made with the spindle at rest.
+        A step that cuts and is no rapid has no spindle speed.
     """
     n = len(steps)
     found = run.contact(steps) if found is None else found

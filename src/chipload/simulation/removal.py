@@ -103,7 +103,7 @@ class Removal:
     mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
         of the coefficients; None: the material does not state their uncertainty
     piece : the chip with most pieces that are most alike (:mod:`chipload.simulation.chip_areas`); None: not asked for
-    findings : rapids that cut
+    findings : rapids that cut, feeds that cut with the spindle at rest
     labels : of the program, `label` of the columns counts in them
     cuts : tooth engagement, one for each cutter that cuts; empty unless requested
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty where nothing
@@ -197,7 +197,7 @@ class RunningSums:
     steps : how many they are
     s_mm, t_s, cut_s : their length [mm], their time and the time in cut [s]
     basis : (4, 6) integral over the time in cut of the factors of the coefficients
-    rapids : lines with rapids that cut
+    rapids : lines with rapids that cut, and with feeds that cut with the spindle at rest
     shank : the run asks for the shank in material
     """
 

@@ -37,7 +37,7 @@ class Steps:
     p0, p1 : (n, 3) float [mm], tip at the start and the end
     a0, a1 : (n, 3) float, unit axis there
     seconds : (n,) float, at the commanded feed; 0 for a rapid. What chips and loads go by
-    rapid : (n,) bool
+    rapid : (n,) bool; so counts a feed with the spindle at rest, which goes through material without a chip
     spindle : (n,) float [rad/s], signed as in the Program
     tool, line, label : (n,) int
     duration : (n,) float [s], on the machine: rapids, accelerations and, in the step before it, a dwell included; None:
@@ -258,7 +258,7 @@ def _cut(moves: _Moves, first: int, end: int) -> Steps:
         _turn_axes(a0, a1, moves.angle[at], u0),
         _turn_axes(a0, a1, moves.angle[at], u1),
         seconds / parts,
-        rapid,
+        rapid | (chords.spindle[at] == 0.0),
         chords.spindle[at],
         chords.tool[at],
         chords.line[at],

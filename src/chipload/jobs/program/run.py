@@ -72,7 +72,7 @@ def check(job: SetupsJob) -> tuple[list[str], bool]:
     Raises
     ------
     InputError
-        As :func:`run`, but for a cut with the spindle at rest, which only the simulation finds.
+        As :func:`run`.
     """
     machine = machine_of(job)
     if job.table.setup:
