@@ -15,7 +15,7 @@ from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.grid import CellGrid, grid_over
 from chipload.structure.cells.moments import StockRegion
 from chipload.structure.cells.nearest import StockSections
-from chipload.structure.cells.states import RemovalState, StepLines, size_of, step_compliances
+from chipload.structure.cells.states import RemovalState, StepLines, size_of, states_between_passes, step_compliances
 from chipload.structure.cells.thickness import cells_over, thinnest
 from chipload.structure.cells.workpiece import Elastic, cell_workpiece, line_compliances
 
@@ -229,3 +229,56 @@ def test_compliance_follows_the_removal():
     top = int(np.argmax(size_of(rough.compliance) * (1.0 + rough.uncertainty)))
     assert top in rough.worst.tolist()
     assert size_of(rough.compliance)[top] == pytest.approx(alone[top], rel=1e-9)
+
+
+def passes_along(*places, count=10):
+    """Steps of passes along x over 40 mm at (y, low, high), one after another, and a state before each step."""
+    x = np.linspace(0.0, 40.0, count)
+    lines = [[(at, y, low), (at, y, high)] for y, low, high in places for at in x]
+    n = len(lines)
+    states = [RemovalState(k, float(k), lambda: None) for k in range(n + 1)]
+    return StepLines(np.arange(n), np.array(lines), np.ones(n), np.arange(float(n))), states
+
+
+def test_a_state_stands_between_two_passes_over_a_place():
+    steps, states = passes_along((0.0, -5.0, 0.0), (-1.0, -5.0, 0.0), (-2.0, -5.0, 0.0))
+    rows = np.arange(0, 30, 3)
+    chosen = states_between_passes(steps, rows, states, 4.0)
+    for row in rows[rows < 20].tolist():
+        again = row + 10  # the step of the next pass beside it
+        assert any(row < states[k].step <= again for k in chosen)
+    # a pass begins where the one before it began: one state between two passes
+    assert len(chosen) == 2
+    # below it, beside it and once alone: no pass comes again
+    for places in (((0.0, -5.0, 0.0), (0.0, -10.0, -5.0)), ((0.0, -5.0, 0.0), (30.0, -5.0, 0.0)), ((0.0, -5.0, 0.0),)):
+        steps, states = passes_along(*places)
+        assert states_between_passes(steps, np.arange(len(steps.step)), states, 4.0) == []
+
+
+def test_steps_before_a_later_pass_are_not_taken_for_what_it_leaves():
+    # a wall of 9 mm is made 6 and then 3 mm thin, each time along its whole length
+    stock = LayeredStock.block((0, 0, 0), (60, 9, 30), 30.0, 100.0)
+    stocks, lines, removed = [(0, 0.0, stock.copied())], [], 0.0
+    for y in (6.0, 3.0):
+        for k in range(6):
+            x = 10.0 * k
+            lines.append([(x + 5.0, y, 5.0), (x + 5.0, y, 30.0)])
+            stock.remove(0, shapely.box(x, y, x + 10, 10))
+            removed += 900.0
+            stocks.append((len(lines), removed, stock.copied()))
+    grid = grid_over((0, 0, 0), (60, 9, 30), 9.0)
+
+    def build(s):
+        return lambda: cell_workpiece(s, grid, ALUMINIUM, [below(s)])
+
+    states = [RemovalState(k, v, build(s)) for k, v, s in stocks]
+    steps = StepLines(np.arange(12), np.array(lines), np.full(12, 100.0), np.arange(12) * 900.0)
+    found = step_compliances(steps, states, tolerance=10.0, most=5, spacing=5.0)
+    assert {0, 6, 12} <= set(found.states)
+    alone = np.array([size_of(line_compliances(states[k].build(), steps.lines[k : k + 1]))[0] for k in range(12)])
+    after = np.array([size_of(line_compliances(states[k + 1].build(), steps.lines[k : k + 1]))[0] for k in range(12)])
+    size = size_of(found.compliance)
+    assert (np.abs(size / alone - 1.0) <= found.uncertainty + 1e-9).all()
+    # what is stated for the first pass is within what that pass alone changes
+    first = slice(0, 6)
+    assert (size * (1.0 + found.uncertainty))[first].max() < 1.2 * after[first].max()

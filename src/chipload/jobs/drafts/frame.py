@@ -261,7 +261,7 @@ def _check(
                     *elastic_entries(),
                     Entry("yield_mpa", 430.0, "7075-T6 plate", True),
                     Entry("cell_mm", round(CELL * thinnest, 3), f"{CELL:g} times the thinnest wall or floor", True),
-                    Entry("states", 8),
+                    Entry("states", STATES, "one before each pass over a wall, and more where it bends most"),
                 ),
             ),
             DraftTable(

@@ -1,9 +1,12 @@
 """Compliance of a workpiece where it is cut, in the state of removal in which each step cuts it.
 
-Notation: a state is the stock before a step. Compliance at a place only grows while material is removed, so between two
-states it lies between those of both. It is solved in a few states and interpolated between them by the volume removed,
-its size by its logarithm. An interval whose two states differ most in deflection, force times compliance, is halved by
-volume, until none differs by more than the tolerance times the greatest deflection or there are enough states.
+Notation: a state is the stock before a step. Compliance at a place only grows while material is removed, so between
+two states it lies between those of both. It is solved in a few states and interpolated between them by the volume
+removed, its size by its logarithm. Where a later pass cuts the surface that a step left, its contact line lies in what
+is thinner by that pass, and the later state says little of the step's own: so there are states, as few as possible,
+that for each step lie between it and the next pass over its place. Then an interval whose two states differ most in
+deflection, force times compliance, is halved by volume, until none differs by more than the tolerance times the
+greatest deflection or there are enough states.
 
 Some contact lines are solved, at most :data:`LINES`, no nearer to one another than they must be; a step between two of
 them takes the mean by distance. Then the step whose deflection may be greatest, by the greater of both states, is
@@ -138,7 +141,7 @@ def step_compliances(
     built : called with each state that is solved, by its number, each time that it is built
     """
     solver = _Solver(steps, states, spaced_rows(steps.lines, spacing, LINES), built)
-    chosen, spans = _choose_states(solver, tolerance, most, progress)
+    chosen, spans = _choose_states(solver, tolerance, most, 4.0 * spacing, progress)
     out, doubt = np.zeros((len(steps.step), len(STATIONS), 3, 3)), np.zeros(len(steps.step))
     for a, b in spans:
         own, rows = solver.rows(a, b), solver.sampled(a, b)
@@ -229,11 +232,13 @@ class _Solver:
 
 
 def _choose_states(
-    solver: _Solver, tolerance: float, most: int, progress: Progress
+    solver: _Solver, tolerance: float, most: int, near: float, progress: Progress
 ) -> tuple[list[int], list[tuple[int, int]]]:
     """States that differ by at most ``tolerance`` of the greatest deflection or are ``most``, and their intervals."""
     states = solver.states
+    between = states_between_passes(solver.steps, solver.samples, states, near)
     chosen = _first_states(states)
+    chosen = sorted({*chosen, *between}) if len({*chosen, *between}) <= most else chosen
     for n, k in enumerate(chosen):
         progress(n / most, "states of the workpiece")
         # the steps on both sides at once, so that no state is built twice
@@ -265,6 +270,36 @@ def _first_states(states: Sequence[RemovalState]) -> list[int]:
     removed = np.array([state.removed for state in states])
     between = [int(np.abs(removed - share * whole).argmin()) for share in (1.0 / 3.0, 2.0 / 3.0)]
     return sorted({0, *between, len(states) - 1})
+
+
+def states_between_passes(steps: StepLines, rows: Indices, states: Sequence[RemovalState], near: float) -> list[int]:
+    """Numbers of the fewest states of which one lies after each step and before the next pass over its place; O(r c).
+
+    Parameters
+    ----------
+    rows : (r,) int, the steps that are looked at
+    near : a pass over the place of a step comes so near to its contact line [mm] after it was twice as far away
+    """
+    middle, ends = steps.lines.mean(axis=1), steps.lines[..., 2]
+    first = np.array([state.step for state in states])
+    spans = []
+    for row in rows.tolist():
+        away = np.linalg.norm(middle[row + 1 :, :2] - middle[row, :2], axis=1)
+        left = int(np.argmax(away > 2.0 * near)) if (away > 2.0 * near).any() else len(away)
+        level = (ends[row + 1 :].min(axis=1) < ends[row].max()) & (ends[row + 1 :].max(axis=1) > ends[row].min())
+        again = np.flatnonzero(level[left:] & (away[left:] <= near))
+        if not len(again):
+            continue
+        low = int(np.searchsorted(first, steps.step[row], side="right"))
+        high = int(np.searchsorted(first, steps.step[row + 1 + left + again[0]], side="right")) - 1
+        if low <= high:
+            spans.append((high, low))
+    # each span has a state: the last one of the span that ends first is in as many others as any
+    out: list[int] = []
+    for high, low in sorted(spans):
+        if not out or out[-1] < low:
+            out.append(high)
+    return out
 
 
 def spaced_rows(lines: Array, spacing: float, most: int) -> Indices:
