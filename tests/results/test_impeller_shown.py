@@ -119,7 +119,9 @@ def test_the_page_shows_them(shown, browser) -> None:
         page.goto(served.address(f"?show={shown.folder.name}"))
         page.wait_for_selector(".cv-ramp")
         page.wait_for_selector(".cl-now")
-        first = shown.result.tracks[shown.used[0]]
+        # it opens with the program of the critical limit
+        number = next(k for k in shown.used if shown.result.tracks[k].name == shown.result.critical_program)
+        first = shown.result.tracks[number]
         assert page.inner_text(".cl-space .cv-title").startswith("tool clearance [mm]")
         # the patches of all surfaces have one legend
         titles = page.locator(".cl-space .cv-title").all_inner_texts()
@@ -130,7 +132,7 @@ def test_the_page_shows_them(shown, browser) -> None:
             page.evaluate(f"{VIEW}.go({row})")
             drawn(page)
             volumes.append(page.evaluate(f"{VIEW}.state().stock.volume"))
-        stock = read_removal(shown.folder / REMOVAL, shown.used[0])
+        stock = read_removal(shown.folder / REMOVAL, number)
         assert volumes == pytest.approx([stock.volumes[stock.frame_of(r)] for r in (0, rows // 2, rows - 1)], rel=0.01)
         assert volumes[0] > volumes[1] > volumes[2]
         name = next(m.name for m in shown.result.maps if m.column == "largest_diameter_mm")
