@@ -145,7 +145,7 @@ def cell_workpiece(
     pieces, count = scipy.ndimage.label(share > LEAST_SHARE)
     if count > 1:
         touched = np.unique(pieces[springs.cells & (pieces > 0)]).tolist()
-        fixed = [k for k in touched if _is_held(clamps, stock, grid, np.where(pieces == k, share, 0.0), elastic)]
+        fixed = [k for k in touched if _is_clamped(clamps, stock, grid, np.where(pieces == k, share, 0.0), elastic)]
         kept = np.isin(pieces, fixed or touched)
         loose = float((share * grid.volumes)[~kept].sum())
         if loose > 0.0:
@@ -161,7 +161,7 @@ def cell_workpiece(
     )  # fmt: skip
 
 
-def _is_held(
+def _is_clamped(
     clamps: Sequence[Clamp], stock: LayeredStock, grid: CellGrid, share: NDArray[np.float64], elastic: Elastic
 ) -> bool:
     """Whether the clamps leave a piece no rigid motion; ``share`` of each cell that it fills."""
