@@ -283,8 +283,8 @@ def read_machine(path: str | Path) -> Machine:
 def machine_names() -> tuple[str, ...]:
     """Names of the machines that come with chipload, sorted.
 
-    >>> machine_names()[7:9]
-    ('vmc', 'vmc-fanuc')
+    >>> {"vmc", "vmc-fanuc"} <= set(machine_names())
+    True
     """
     return shipped_names("machine")
 
