@@ -49,6 +49,7 @@ def test_the_page_states_what_the_summary_states(example, browser, served, name)
         page.set_default_timeout(60_000)
         page.goto(served.address(f"?show={name}"))
         page.wait_for_selector(".cl-word", state="visible")
+        page.wait_for_function("document.querySelector('.cl-message')?.innerText")
         assert (page.inner_text(".cl-word"), page.inner_text(".cl-message")) == (summary["verdict"], summary["message"])
         assert tracks[0]["in_use"]
         for k, track in enumerate(tracks[:MOST]):
