@@ -10,6 +10,8 @@ from chipload.errors import InputError
 from chipload.geometry.point_cloud import MOST, levels_of_cloud
 from chipload.geometry.sections import check_sections, loft, read_sections
 
+DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
+CLOUDS = DATA / "blades" / "parablade"
 SHUFFLE = np.random.default_rng(3)
 
 
@@ -98,8 +100,8 @@ def test_a_file_with_numbers_of_points(tmp_path):
         read_sections([path], "mm", columns="X Y Z")
 
 
-@pytest.mark.skipif("CHIPLOAD_DATA" not in os.environ, reason="CHIPLOAD_DATA is not set")
+@pytest.mark.skipif(not CLOUDS.is_dir(), reason="no blades of parablade in CHIPLOAD_DATA or ../shared/data")
 @pytest.mark.parametrize(("name", "count"), [("prismatic_radial", 3), ("Aachen_3D", 4)])
 def test_clouds_of_others(name, count):
-    path = Path(os.environ["CHIPLOAD_DATA"]) / "blades" / "parablade" / name / "MoveSurface.txt"
+    path = CLOUDS / name / "MoveSurface.txt"
     assert len(check_sections(read_sections([path], "m", columns="X Y Z"))) == count

@@ -90,9 +90,9 @@ def _alike(ring: Floats, before: Floats) -> Floats:
     far = np.linalg.norm(ring[:, None] - ring[None], axis=2)
     ends = np.unravel_index(int(far.argmax()), far.shape)
     rings = [np.roll(ring, -int(k), axis=0) for k in ends]
-    rings += [np.roll(other[::-1], 1, axis=0) for other in rings]
+    rings += [np.roll(one[::-1], 1, axis=0) for one in rings]
     wanted = _resample(before)
-    return min(rings, key=lambda other: float(((_resample(other) - wanted) ** 2).sum()))
+    return min(rings, key=lambda one: float(((_resample(one) - wanted) ** 2).sum()))
 
 
 def _resample(ring: Floats) -> Floats:

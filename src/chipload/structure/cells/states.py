@@ -275,6 +275,8 @@ def _first_states(states: Sequence[RemovalState]) -> list[int]:
 def states_between_passes(steps: StepLines, rows: Indices, states: Sequence[RemovalState], near: float) -> list[int]:
     """Numbers of the fewest states of which one lies after each step and before the next pass over its place; O(r c).
 
+    A pass is over a place where it comes near in the plan and the heights of both contact lines overlap.
+
     Parameters
     ----------
     rows : (r,) int, the steps that are looked at
