@@ -21,6 +21,7 @@ from chipload.jobs.impeller.read_program import read_program_of
 from chipload.jobs.impeller.removal import ImpellerProgram, inputs_of, removal_of_programs, tool_with_teeth
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.feeds import ForceTerms
+from chipload.program.check import SPINDLE_OFF
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import LINE, RAPID, Program
 from chipload.program.release import NOT_SIMULATED
@@ -193,11 +194,18 @@ def test_a_shank_in_material_exceeds_and_the_next_program_cuts_what_the_flutes_l
     assert not two.findings
 
 
-def test_a_holder_in_the_stock_is_a_collision_and_what_is_not_simulated_is_unproven() -> None:
+def test_a_holder_in_the_stock_is_a_collision() -> None:
     stubby = replace(CUTTER, cutting_length=4.0, shank_diameter=WIDE, reach=5.0, holder_diameter=40.0)
     (one,) = removed(written(slot(1, True, 9.0), replace(stubby, cutting_length=4.5)))
     assert any(f.code == "collision" and f.severity is Severity.EXCEEDS for f in one.findings)
-    still = slot(1, True)
-    still = replace(still, spindle=np.zeros(len(still)))
-    (one,) = removed(written(still))
-    assert [(f.code, f.severity) for f in one.findings] == [("not-simulated", Severity.UNPROVEN)]
+
+
+@pytest.mark.parametrize("lying", [True, False])
+def test_a_rapid_and_a_spindle_at_rest_in_the_stock_exceed(lying: bool) -> None:
+    """The cutter leaves the block in the same step, so the last instants of that step take next to nothing."""
+    cut = slot(1, lying)
+    still = replace(cut, spindle=np.zeros(len(cut)))
+    hasty = replace(cut, motion=np.full(len(cut), RAPID), feed=np.zeros(len(cut)))
+    for program, code in ((still, SPINDLE_OFF), (hasty, "rapid-cuts")):
+        (one,) = removed(written(program))
+        assert [(f.code, f.severity) for f in one.findings] == [(code, Severity.EXCEEDS)]

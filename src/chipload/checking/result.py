@@ -172,15 +172,15 @@ def findings_of(program: ProgramResult, simulation: SimulationResult) -> tuple[F
     return (
         *([] if empty is None else [empty]),
         *(as_exceeding(f) for f in program.reading.violations),
-        *simulation_findings(simulation),
+        # cuts with the spindle at rest are violations of the reading
+        *(f for f in simulation_findings(simulation) if f.code != SPINDLE_OFF),
     )
 
 
 def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
-    """Return findings of the simulation: rapids in material, collisions, chips beyond the range of the coefficients."""
-    # cuts with the spindle at rest are violations of the reading
-    own = [f for f in simulation.removal.findings if f.code != SPINDLE_OFF]
-    out = [as_exceeding(f) if f.code == "rapid-cuts" else f for f in own]
+    """Return findings of the simulation: rapids and a spindle at rest in material, collisions, chips out of range."""
+    of_motion = ("rapid-cuts", SPINDLE_OFF)
+    out = [as_exceeding(f) if f.code in of_motion else f for f in simulation.removal.findings]
     out += collision_findings(simulation.collisions.found)
     known = {(f.code, f.line) for f in out}
     out += [f for f in simulation.collisions.stock.findings if f.code != "rapid-cuts" or (f.code, f.line) not in known]

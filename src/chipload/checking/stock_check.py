@@ -21,7 +21,7 @@ from chipload.checking.part_place import find_misplaced_part
 from chipload.checking.workpiece import default_spacing, stock_box
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, Severity
-from chipload.program.program import Program
+from chipload.program.program import RAPID, Program
 from chipload.progress import Progress
 from chipload.simulation.heights.height_map import HeightMap, bands_of, follow_heights, pitch_of
 from chipload.simulation.heights.loose_stock import find_loose_stock
@@ -50,10 +50,13 @@ def check_stock(
     what = "shank and holder in the stock"
     progress(0.0, what)
     found = follow_heights(steps, inputs.cutters, stock, pitch, op.tolerance_mm, lambda done: progress(0.0, what), kept)
+    # a feed with the spindle at rest is a finding of its own
+    rapid = set(program.line[program.motion == RAPID].tolist())
     findings = [
         Finding("rapid-cuts", c.line, f"a rapid goes through material, {c.depth_mm:.3g} mm deep", Severity.EXCEEDS,
                 None, c.step)
         for c in found.rapids
+        if c.line in rapid
     ]  # fmt: skip
     hidden, unchecked, touched = found.hidden_mm, list[str](), tuple[Collision, ...]()
     if checks.shank_in_stock:

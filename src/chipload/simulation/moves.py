@@ -338,8 +338,9 @@ def remove_by_moves(
         np.maximum.at(removed[:, 3], found.step, found.overrun)
     rapid = steps.rapid[found.step]
     length = np.linalg.norm(steps.p1 - steps.p0, axis=1)[found.step]
-    film = rapid & (found.volume <= FILM * run.tolerance * length * found.edge_mm)
-    removed[found.step[film], 1] = 0.0
+    # a rapid only touches a film where each of its instants does
+    thick = np.bincount(found.step, found.volume > FILM * run.tolerance * length * found.edge_mm, n) > 0.0
+    removed[steps.rapid & ~thick, 1] = 0.0
     feeding = np.flatnonzero(~rapid)
     for number in sorted(set(steps.tool[found.step[feeding]].tolist())):
         entries = feeding[steps.tool[found.step[feeding]] == number]
