@@ -7,6 +7,7 @@ import pytest
 
 from chipload.report.shape_figure import magnification, shape_figure, shape_note
 from chipload.result import SurfaceMap
+from chipload.result.style import SCALE
 
 POINTS = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [100.0, 50.0, 0.0], [0.0, 50.0, 0.0]])
 MOVED = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.024], [0.0, 0.0, 0.0], [0.0, 0.0, -0.012]])
@@ -35,5 +36,16 @@ def test_magnification(most: float, times: float) -> None:
 
 
 def test_a_map_without_displacement_stands_where_it_is() -> None:
-    assert np.asarray(shape_figure(plate(None)).data[1].z).tolist() == [0.0] * 4
-    assert "not displaced" in shape_note(plate(None))
+    (flat,) = shape_figure(plate(None)).data
+    assert np.asarray(flat.z).tolist() == [0.0] * 4
+    # its values have both signs
+    assert (flat.cmin, flat.cmax) == (-24.0, 24.0)
+    assert shape_note(plate(None)) == "part after release: -12 to 24 \u00b5m."
+
+
+def test_a_quantity_without_a_sign_is_coloured_from_its_least_value() -> None:
+    sizes = SurfaceMap("blade: largest cutter", "largest_diameter_mm", POINTS, np.array([8.0, 25.0, 12.0, 8.0]), FACES)
+    (drawn,) = shape_figure(sizes).data
+    assert (drawn.cmin, drawn.cmax) == (8.0, 25.0)
+    assert drawn.colorscale[0][1] == SCALE[0][1]
+    assert shape_note(sizes) == "blade: largest cutter: 8 to 25 mm."

@@ -25,7 +25,7 @@ from chipload.report.colouring import POINTS, WORDS, drawn_rows
 from chipload.report.folder import write_result
 from chipload.report.scene import legend
 from chipload.report.view import parts_of
-from chipload.result import Track, TrackKind, Verdict, in_memory
+from chipload.result import LimitCheck, Track, TrackKind, Verdict, in_memory
 from chipload.web import plots, scene
 from chipload.web.asset_cache import CAPACITY, AssetCache
 from chipload.web.checks import bound_of, findings, limits, row_of
@@ -224,6 +224,27 @@ def test_a_text_with_new_feeds_is_shown_in_the_place_of_the_old_one(root: Path) 
         own = source_of(r, r.tracks[0])
         assert (own.name, own.note) == (shown, note)
         assert own.of_row.tolist() == LINE.tolist()
+    # a text of another job than one that changes feeds has lines of its own
+    path.write_text(
+        text.replace('"0-program.apt"', '"0-feeds.ngc"').replace('"capability": "program"', '"capability": "torque"')
+    )
+    r = open_result(root, "r")
+    assert r.result.capability == "torque"
+    assert source_of(r, r.tracks[0]).name == "square.ngc"
+
+
+def test_limits_are_listed_by_state_and_margin(root: Path) -> None:
+    r = open_result(root, "r")
+    track = r.tracks[0]
+    checks = tuple(
+        LimitCheck(name, 100.0, worst, state, "program", 10, 1, resolution_error=0.0)
+        for name, worst, state in (
+            ("force_n", 30.0, Verdict.HOLDS), ("torque_nm", 120.0, Verdict.EXCEEDS), ("power_w", 90.0, Verdict.HOLDS),
+            ("chip_max_mm", 400.0, Verdict.EXCEEDS), ("deflection_um", None, Verdict.UNPROVEN),
+        )
+    )  # fmt: skip
+    listed = limits(replace(track, own=replace(track.own, limits=checks)))
+    assert [c.name for c in listed] == ["chip_max_mm", "torque_nm", "deflection_um", "power_w", "force_n"]
 
 
 def test_a_check_without_a_row_leads_to_the_nearest_on_its_line(root: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,9 +60,9 @@ def bound_of(result: PageResult, track: PageTrack, column: str) -> Bound | None:
 
 
 def limits(track: PageTrack) -> list[LimitCheck]:
-    """The limits of a track, the worst state first."""
+    """The limits of a track, the worst state first, then the least margin; those whose margin is not known last."""
     order = list(Verdict)
-    return sorted(track.own.limits, key=lambda c: -order.index(c.state))
+    return sorted(track.own.limits, key=lambda c: (-order.index(c.state), math.inf if c.margin is None else c.margin))
 
 
 def row_of(track: PageTrack, item: LimitCheck | Finding) -> int | None:

@@ -1,10 +1,10 @@
 """The program of a track, and the line of each row of its history.
 
-The text is the one with new feeds where the result holds one, else the original where the opened folder has it (found
-by the hash that the result states), else the program that the result holds for the machine, else its CL data. The
-history of a program that was written for turning axes counts in the lines of its text. Where the history does not
-count in the lines of the text, rows are followed along its motions: each row lies on the motion that is shown, within
-a tolerance.
+The text is the one with new feeds where the result has changed nothing else, else the original where the opened folder
+has it (found by the hash that the result states), else the program that the result holds for the machine, else its CL
+data. The history of a program that was written for turning axes counts in the lines of its text. Where the history does
+not count in the lines of the text, rows are followed along its motions: each row lies on the motion that is shown,
+within a tolerance.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ Ints = NDArray[np.int64]
 TURN, NEAR_MM = 0.01, 0.02
 #: rows that are followed one by one, chords of look-ahead, and the largest text [bytes]
 FOLLOWED, AHEAD, LARGEST = 20_000, 48, 50_000_000
+#: capabilities that write the program of the user again with other feeds, and count its history in its lines
+FEEDS = ("program", "feeds")
 #: after so many rows on no motion at all the rest of the program is no longer searched for one
 LOST = 200
 
@@ -91,7 +93,9 @@ def source_of(result: PageResult, track: PageTrack) -> TrackText | None:
 
 
 def _with_new_feeds(result: PageResult, track: PageTrack) -> Path | None:
-    """The program with other F words, line for line, where the track has one; None: it kept its feeds."""
+    """The program with other F words, in whose lines the history counts; None: none has changed them."""
+    if result.result.capability not in FEEDS:
+        return None  # the controller of the torque gets a text of its own, with other lines
     for name in track.own.programs:
         if Path(name).suffix == ".apt":
             continue

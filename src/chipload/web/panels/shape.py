@@ -1,4 +1,4 @@
-"""The panel of a result without a motion, as of a distortion: verdict, limits, and its displaced surfaces."""
+"""The panel of a result without a motion, as of a distortion: verdict, limits, and its surfaces."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def variant_table(result: Result) -> str:
             rows.append(
                 f"<tr><td>{name}</td><td>{escape(check.column.label)}</td><td class=n>{worst}</td>"
                 f"<td class=n>{number_text(check.limit, 6)} {escape(check.column.unit)}</td><td>{bar_html(check)}</td>"
-                f'<td class="cl-{state}">{check.state.value}</td><td>{escape(check.reason)}</td></tr>'
+                f'<td class="cl-{state}">{check.state.value}</td><td class="cl-reason">{escape(check.reason)}</td></tr>'
             )
     head = "".join(
         f"<th{' class=n' if name in ('worst', 'limit value') else ''}>{name}</th>"
@@ -59,7 +59,7 @@ class ShapePanel:
                     ui.label(line)
             for change in result.changes:
                 ui.label(f"change: {change.line_text}")
-            ui.html(variant_table(result), sanitize=True).mark("variants")
+            ui.html(variant_table(result), sanitize=True).classes("cl-scroll").props("tabindex=0").mark("variants")
             for one in (m for m in result.maps if len(m.faces)):
                 ui.label(shape_note(one)).classes("cl-note")
                 ui.plotly(shape_figure(one)).classes("cl-shape")
