@@ -152,8 +152,10 @@ def test_a_program_that_is_dropped_is_asked_about_run_and_shown(window, folder) 
     page = window("")
     page.wait_for_selector(".cl-drop")
     files = [{"name": "slot.nc", "mimeType": "text/plain", "buffer": SLOT.encode()}]
-    page.set_input_files(".cl-drop input", [{**files[0], "name": "slot.step"}])
+    page.set_input_files(".cl-drop input", [{**files[0], "name": "slot.ply"}])
     page.locator(".cl-drop [role=status]").get_by_text("not the ending of a program").wait_for()
+    page.set_input_files(".cl-drop input", [{**files[0], "name": "slot.step"}])
+    page.locator(".cl-drop [role=status]").get_by_text("slot.step: ").wait_for()
     page.set_input_files(".cl-drop input", files)
     page.wait_for_selector(".cl-question", state="visible")
     assert 1 <= page.locator(".cl-question").count() <= 5
@@ -180,6 +182,32 @@ def test_a_program_that_is_dropped_is_asked_about_run_and_shown(window, folder) 
     assert summary["verdict"] == "unproven"
     page.wait_for_function("document.querySelector('.cl-word').textContent == 'unproven'")
     assert any("guess" in f["text"] for f in summary["findings"])
+
+
+def test_a_drawing_that_is_dropped_becomes_a_job(window, folder) -> None:
+    page = window("")
+    page.wait_for_selector(".cl-drop")
+    # by the mouse: the browser hands the file over as a drop
+    data = page.evaluate_handle(
+        """(text) => { const data = new DataTransfer();
+        data.items.add(new File([text], "housing.dxf")); return data; }""",
+        (copy_example("pocket", folder / "pocket") / "housing.dxf").read_text(),
+    )
+    try:
+        page.dispatch_event(".cl-drop", "drop", {"dataTransfer": data})
+        page.wait_for_selector(".cl-question", state="visible")
+        assert serious_problems(page) == []
+        page.get_by_role("textbox", name="cutter.0.diameter_mm").fill("6")
+        page.get_by_text("Save the job only").click()
+        job = folder / "housing-job" / "job.toml"
+        wait(job.exists)
+        raw = tomllib.loads(job.read_text())
+        assert (raw["part"]["file"], raw["cutter"][0]["diameter_mm"]) == ("housing.dxf", 6.0)
+        # the job is shown, with a button that runs it
+        page.locator(".cl-home").get_by_text("plans, checks and writes a result").wait_for()
+    finally:
+        shutil.rmtree(folder / "pocket")
+        shutil.rmtree(folder / "housing-job", ignore_errors=True)
 
 
 def test_what_is_known_of_the_limits_is_stated_before_the_result(window, folder) -> None:

@@ -2,9 +2,13 @@
 
 const PART = 300_000;
 
-export async function send(file: File | undefined, most: number, emit: (part: object) => void): Promise<void> {
+/** `most`: largest program, `mostModel`: largest file whose name ends as one of `models`, in bytes. */
+export async function send(
+  file: File | undefined, most: number, mostModel: number, models: string[], emit: (part: object) => void,
+): Promise<void> {
   if (!file) return;
-  const { name, size } = file, of = size > most ? 0 : Math.max(1, Math.ceil(size / PART));
+  const { name, size } = file, known = models.some((ending) => name.toLowerCase().endsWith(ending));
+  const of = size > (known ? mostModel : most) ? 0 : Math.max(1, Math.ceil(size / PART));
   if (!of) { emit({ name, size, part: 0, of, data: "" }); return; }
   const bytes = new Uint8Array(await file.arrayBuffer());
   for (let part = 0; part < of; part++) {

@@ -1,7 +1,7 @@
-"""A program that is dropped on the page: its text, the draft of its job, the questions, and the job that they make.
+"""A file that is dropped on the page: its bytes, the draft of its job, the questions, and the job that they make.
 
-The bytes are read as an NC program or CL data, as `chipload init` reads one, and never as anything else. They become a
-file of the opened folder when the job is written.
+A program, a drawing or a model is read as `chipload init` reads it, by the ending of its name, and never as anything
+else. The bytes become a file of the opened folder when the job is written.
 """
 
 from __future__ import annotations
@@ -18,15 +18,17 @@ from typing import Any
 
 from chipload.errors import InputError
 from chipload.jobs.drafts.draft import Draft, write_draft
-from chipload.jobs.drafts.program import draft_program
+from chipload.jobs.drafts.make import drafts_of
 from chipload.jobs.drafts.questions import Question, questions_with_keys
 from chipload.program.control import CONTROLS
 from chipload.program.read import ENDINGS
 from chipload.tables import shipped_names
 from chipload.web.job_form import FormField, job_errors, job_fields
 
-#: largest program [bytes] that is taken
-LARGEST = 2_000_000
+#: endings of drawings and models
+MODELS = (".dxf", ".step", ".stp", ".stl")
+#: largest program, and largest drawing or model, that is taken [bytes]
+LARGEST, LARGEST_MODEL = 2_000_000, 20_000_000
 #: where the value of an answer comes from
 ANSWER = "answered on the page"
 #: what a name of a file keeps
@@ -46,21 +48,24 @@ class Upload:
         Raises
         ------
         InputError
-            It is too large, no program by its name, or its parts do not follow one another.
+            It is too large, of another kind by its name, or its parts do not follow one another.
         """
         try:
             name, size, number, count = str(part["name"]), int(part["size"]), int(part["part"]), int(part["of"])
             data = base64.b64decode(str(part["data"]), validate=True)
         except (TypeError, KeyError, ValueError, binascii.Error):
             raise InputError("the file did not arrive whole: drop it again") from None
-        if size > LARGEST or len(data) > LARGEST:
+        name = file_name(name)
+        model = _is_model(name)
+        most = LARGEST_MODEL if model else LARGEST
+        if size > most or len(data) > most:
             raise InputError(
-                f"{name[:80]}: {size} bytes: the page takes programs of at most {LARGEST}: use chipload init FILE DIR"
+                f"{name}: {size} bytes: the page takes {'drawings and models' if model else 'programs'} of at most "
+                f"{most}: use chipload init FILE DIR"
             )
-        name = program_name(name)
         if number == 0:
             self.name, self.data, self.next = name, bytearray(), 0
-        if (name, number) != (self.name, self.next) or len(self.data) + len(data) > LARGEST:
+        if (name, number) != (self.name, self.next) or len(self.data) + len(data) > most:
             raise InputError(f"{name}: did not arrive whole: drop it again")
         self.data += data
         self.next += 1
@@ -71,24 +76,24 @@ class Upload:
         return name, bytes(self.data)
 
 
-def program_name(name: str) -> str:
-    """The name of a file for a program, in letters that every system takes.
+def file_name(name: str) -> str:
+    """The name of a dropped file, in letters that every system takes.
 
     Raises
     ------
     InputError
-        Its ending is not that of a program.
+        Its ending is not that of a program, a drawing or a model.
 
-    >>> program_name("../Teil 7.NC")
+    >>> file_name("../Teil 7.NC")
     'Teil_7.NC'
     """
     last = PurePosixPath(name.replace("\\", "/")).name
     plain = _NAME.sub("_", last).lstrip(".-")[-80:]
     ending = PurePosixPath(plain).suffix.lower()
-    if ending not in ENDINGS:
+    if ending not in ENDINGS and ending not in MODELS:
         raise InputError(
             f"{last[:80]}: {ending or 'no ending'} is not the ending of a program ({', '.join(sorted(ENDINGS)[:12])}, "
-            "...): drawings and models are read by chipload init FILE DIR"
+            f"...), a drawing or a model ({', '.join(MODELS)}): chipload init FILE DIR reads some other files"
         )
     return plain
 
@@ -114,8 +119,8 @@ class AskedQuestion:
 
 
 @dataclass(frozen=True)
-class DroppedProgram:
-    """A program that was dropped, the draft of its job, and its questions, at most five."""
+class DroppedFile:
+    """A file that was dropped, the draft of its job, and its questions, at most five."""
 
     name: str
     data: bytes
@@ -125,30 +130,38 @@ class DroppedProgram:
     @property
     def folder(self) -> str:
         """The folder that is proposed for the job."""
-        return f"{PurePosixPath(self.name).stem or 'program'}-job"
+        return f"{PurePosixPath(self.name).stem or 'file'}-job"
 
 
-def read_dropped(name: str, data: bytes) -> DroppedProgram:
-    """Draft the job of a program, in a folder that is gone when it returns.
+def read_dropped(name: str, data: bytes) -> DroppedFile:
+    """Draft the job of a file, in a folder that is gone when it returns.
 
     Raises
     ------
     InputError
-        It cannot be read as a program.
+        It cannot be read, or nothing in it can be planned.
     """
     with tempfile.TemporaryDirectory(prefix="chipload-") as above:
         folder = Path(above) / "job"
         folder.mkdir()
         (folder / name).write_bytes(data)
-        draft = draft_program(folder / name, folder)
+        try:
+            drafts = drafts_of(folder / name, folder)
+        except InputError as err:
+            raise InputError(str(err).replace(f"{folder}/", "")) from None
+        draft = next(iter(drafts.values()))
+        if len(drafts) > 1:
+            more = (
+                f"thin walls: chipload init {name} DIR writes {len(drafts)} jobs that check them too; this is the first"
+            )
+            draft = replace(draft, notes=(more, *draft.notes))
         fields = {f.path: f for f in job_fields(write_draft(draft, folder))}
-    return DroppedProgram(
-        name, data, draft, tuple(_question_of(draft, q, fields) for q in questions_with_keys(draft.tables))
-    )
+    asked = tuple(_question_of(draft, q, fields) for q in questions_with_keys(draft.tables))
+    return DroppedFile(name, data, draft, asked)
 
 
-def draft_with_answers(program: DroppedProgram, answers: Mapping[tuple[int, str], Any]) -> Draft:
-    """The draft with answers in the place of its guesses, and the program beside the job.
+def draft_with_answers(dropped: DroppedFile, answers: Mapping[tuple[int, str], Any]) -> Draft:
+    """The draft with answers in the place of its guesses, and the file beside the job.
 
     Parameters
     ----------
@@ -159,9 +172,9 @@ def draft_with_answers(program: DroppedProgram, answers: Mapping[tuple[int, str]
     InputError
         An answer is not a value of its key.
     """
-    keys = {(one.table, one.key): one for q in program.questions for one in q.keys}
+    keys = {(one.table, one.key): one for q in dropped.questions for one in q.keys}
     tables = []
-    for number, table in enumerate(program.draft.tables):
+    for number, table in enumerate(dropped.draft.tables):
         entries = [
             replace(e, value=_value(keys[number, e.key], answers[number, e.key]), note=ANSWER, guess=False, example="")
             if (number, e.key) in answers and (number, e.key) in keys
@@ -169,11 +182,11 @@ def draft_with_answers(program: DroppedProgram, answers: Mapping[tuple[int, str]
             for e in table.entries
         ]
         tables.append(replace(table, entries=tuple(entries)))
-    return replace(program.draft, tables=tuple(tables), files={program.name: program.data})
+    return replace(dropped.draft, tables=tuple(tables), files={**dropped.draft.files, dropped.name: dropped.data})
 
 
-def write_answers(program: DroppedProgram, answers: Mapping[tuple[int, str], Any], folder: Path) -> Path:
-    """Write the job of a program with its answers into a new folder, whole or not at all; return the job file.
+def write_answers(dropped: DroppedFile, answers: Mapping[tuple[int, str], Any], folder: Path) -> Path:
+    """Write the job of a file with its answers into a new folder, whole or not at all; return the job file.
 
     Raises
     ------
@@ -182,7 +195,7 @@ def write_answers(program: DroppedProgram, answers: Mapping[tuple[int, str], Any
     OutputError
         The folder cannot be written.
     """
-    draft = draft_with_answers(program, answers)
+    draft = draft_with_answers(dropped, answers)
     with tempfile.TemporaryDirectory(prefix="chipload-") as above:
         errors = job_errors(write_draft(draft, Path(above) / "job"), ())
     if errors:
@@ -191,6 +204,10 @@ def write_answers(program: DroppedProgram, answers: Mapping[tuple[int, str], Any
 
 
 # -- parts ------------------------------------------------------------------------------------------------------
+def _is_model(name: str) -> bool:
+    return PurePosixPath(name).suffix.lower() in MODELS
+
+
 def _question_of(draft: Draft, question: Question, fields: Mapping[str, FormField]) -> AskedQuestion:
     out = []
     for number, key in question.keys:
@@ -218,6 +235,8 @@ def _value(asked: AskedKey, entered: Any) -> Any:
         return entered
     if isinstance(asked.value, list):
         parts = re.split(r"[,;\s]+", entered.strip().strip("[]"))
+        if asked.value and all(isinstance(one, str) for one in asked.value):
+            return [part.strip('"') for part in re.split(r"\s*,\s*", entered.strip().strip("[]")) if part]
         numbers = [_number(asked, part) for part in parts]
         if len(numbers) != len(asked.value):
             raise InputError(f"{asked.path} = {entered[:40]}: must be {len(asked.value)} numbers")

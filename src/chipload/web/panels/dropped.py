@@ -1,8 +1,9 @@
-"""The place where a program is dropped, and the questions about it: lists with search, then one button that runs it."""
+"""The place where a file is dropped, and the questions about it: lists with search, then one button that runs it."""
 
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 from collections.abc import Callable
 from html import escape
@@ -12,7 +13,16 @@ from nicegui import ui
 
 from chipload.errors import ChiploadError
 from chipload.jobs.drafts.draft import toml
-from chipload.web.dropped import LARGEST, AskedKey, AskedQuestion, DroppedProgram, Upload, read_dropped
+from chipload.web.dropped import (
+    LARGEST,
+    LARGEST_MODEL,
+    MODELS,
+    AskedKey,
+    AskedQuestion,
+    DroppedFile,
+    Upload,
+    read_dropped,
+)
 
 #: what a question says of the command line
 _COMMAND = re.compile(r"; (?:--|chipload )[^;]*")
@@ -21,16 +31,18 @@ NOTES = 4
 
 
 class DropZone:
-    """Takes a program by drop or by choice; ``receive`` is told what it asks, ``refuse`` why it is not taken."""
+    """Takes a file by drop or by choice; ``receive`` is told what it asks, ``refuse`` why it is not taken."""
 
-    def __init__(self, receive: Callable[[DroppedProgram], None], refuse: Callable[[str], None]) -> None:
+    def __init__(self, receive: Callable[[DroppedFile], None], refuse: Callable[[str], None]) -> None:
         self.receive, self.refuse = receive, refuse
         self.upload = Upload()
-        send = f"chiploadViewer.send(%s, {LARGEST}, emit)"
+        send = f"chiploadViewer.send(%s, {LARGEST}, {LARGEST_MODEL}, {json.dumps(MODELS)}, emit)".replace('"', "'")
         with ui.element("div").classes("cl-drop").mark("drop") as zone:
-            ui.label("Drop an NC program or CL data here").classes("cl-drop-title")
+            ui.label("Drop a program here (NC, CL data), a drawing (DXF) or a model (STEP, STL)").classes(
+                "cl-drop-title"
+            )
             ui.label("or").classes("cl-note")
-            file = ui.element("input").props('type=file aria-label="choose a program"').mark("program")
+            file = ui.element("input").props('type=file aria-label="choose a file"').mark("program")
             self.state = ui.label("").classes("cl-note").props("role=status").mark("drop-state")
         zone.on("dragover", js_handler="(e) => { e.preventDefault(); }")
         zone.on("drop", self._take, js_handler=f"(e) => {{ e.preventDefault(); {send % 'e.dataTransfer.files[0]'}; }}")
@@ -42,28 +54,28 @@ class DropZone:
             if whole is None:
                 return
             self.state.set_text(f"reading {whole[0]} \u2026")
-            program = await asyncio.to_thread(read_dropped, *whole)
+            dropped = await asyncio.to_thread(read_dropped, *whole)
         except ChiploadError as err:
             self.refuse(str(err))
             self.state.set_text(str(err))
             return
         self.state.set_text("")
-        self.receive(program)
+        self.receive(dropped)
 
 
 class Questions:
-    """The questions about a program; ``answers`` are those that were changed or confirmed."""
+    """The questions about a file; ``answers`` are those that were changed or confirmed."""
 
-    def __init__(self, program: DroppedProgram) -> None:
+    def __init__(self, dropped: DroppedFile) -> None:
         self.entered: dict[tuple[int, str], Any] = {}
         self.changed: set[tuple[int, str]] = set()
         self.confirmed: set[tuple[int, str]] = set()
-        ui.label(program.draft.title).classes("cl-note")
-        for note in program.draft.notes[:NOTES]:
+        ui.label(dropped.draft.title).classes("cl-note")
+        for note in dropped.draft.notes[:NOTES]:
             ui.label(f"found: {note}").classes("cl-note")
-        if not program.questions:
-            ui.label("The program leaves no question open.").classes("cl-note")
-        for number, question in enumerate(program.questions, 1):
+        if not dropped.questions:
+            ui.label("The file leaves no question open.").classes("cl-note")
+        for number, question in enumerate(dropped.questions, 1):
             self._question(number, question)
 
     @property

@@ -12,7 +12,7 @@ from nicegui import background_tasks, ui
 from chipload.errors import InputError, OutputError
 from chipload.report.folder import check_target
 from chipload.result.changes import Change
-from chipload.web.dropped import DroppedProgram, write_answers
+from chipload.web.dropped import DroppedFile, write_answers
 from chipload.web.folder_access import OpenedFolder, is_job, is_result, resolve_name, target_in
 from chipload.web.panels.dropped import Questions
 from chipload.web.result import PageResult
@@ -78,18 +78,18 @@ class RunPanel:
                 _button("Cancel", self.dialog.close)
         self.dialog.open()
 
-    def ask_questions(self, program: DroppedProgram) -> None:
-        """Ask what a dropped program leaves open; the answers become a job in the opened folder."""
+    def ask_questions(self, dropped: DroppedFile) -> None:
+        """Ask what a dropped file leaves open; the answers become a job in the opened folder."""
         self.ask.clear()
         with self.ask:
-            questions = Questions(program)
+            questions = Questions(dropped)
             ui.label("Folder of the job, in the opened folder:").classes("cl-note")
-            where = ui.input(value=program.folder).props('dense outlined aria-label="folder of the job"')
+            where = ui.input(value=dropped.folder).props('dense outlined aria-label="folder of the job"')
             where.classes("cl-out").mark("out")
             message = ui.label("").classes("cl-no")
 
             async def write(run: bool) -> None:
-                await self._write_job(program, questions, str(where.value).strip(), message, run)
+                await self._write_job(dropped, questions, str(where.value).strip(), message, run)
 
             with ui.element("div").classes("cl-entry"):
                 _button("Run", lambda: write(True), "play_arrow").props("unelevated color=primary").props(
@@ -100,14 +100,14 @@ class RunPanel:
         self.dialog.open()
 
     async def _write_job(
-        self, program: DroppedProgram, questions: Questions, folder: str, message: Any, run: bool
+        self, dropped: DroppedFile, questions: Questions, folder: str, message: Any, run: bool
     ) -> None:
-        """Write the job of a dropped program, and run it: the verdict of a coarse run comes first."""
+        """Write the job of a dropped file, and run it: the verdict of a coarse run comes first."""
         try:
             if run and self.runs.now is not None and not self.runs.now.ended:
                 raise InputError("a job is running: stop it first")
             target = target_in(self.opened.root, folder)
-            path = await asyncio.to_thread(write_answers, program, questions.answers, target)
+            path = await asyncio.to_thread(write_answers, dropped, questions.answers, target)
         except (InputError, OutputError) as err:
             message.set_text(str(err).replace(f"{self.opened.root}/", ""))
             return
