@@ -108,7 +108,7 @@ CASES = (
     Case(
         "machine-coordinates",
         "G53 without a stated work offset",
-        replaced("G0 Z10\nM5", "G53 G0 Z10\nM5"),
+        replaced("G0 Z10\nM5", "G53 G0 X10\nM5"),
         "unproven",
         "nc-machine-coordinates",
     ),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chipload.program.commands import ARC
-from control_texts import codes, ends, minutes, read
+from control_texts import codes, dwells, ends, minutes, read
 
 
 def holes(body):
@@ -64,3 +64,12 @@ def test_pocket_milling_and_engraving_are_findings():
     commands, findings = read("G150 P100 Z-3. D1 I3. Q1. K0.2 F100.\nG47 P0 X5. Y5. I0. J5. R1. Z-1. F50.\nX7.", "haas")
     assert codes(findings) == ["nc-not-read", "nc-not-read"]
     assert ends(commands)[-1].tolist() == [7, 0, 10]
+
+
+@pytest.mark.parametrize(
+    ("control", "text", "time"), [("haas", "P0.5", 0.5), ("fanuc", "P500", 0.5), ("haas", "", None)]
+)
+def test_a_pause_at_the_bottom_of_a_pecked_hole(control, text, time):
+    commands, findings = read(f"G83 X5. Y0. Z-4. R2. Q3. {text} F100.\nX9.\nG80", control)
+    assert findings == []
+    assert dwells(commands) == ([] if time is None else [time, time])

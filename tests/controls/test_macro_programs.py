@@ -1,5 +1,7 @@
 """Programs of macro statements and calls, and cycles that follow one another. Oracle: points and times by hand."""
 
+import math
+
 import pytest
 
 from chipload.program.commands import DWELL, LINE
@@ -115,3 +117,27 @@ def test_accuracy_of_a_mazak_is_no_corner():
     assert ends(commands)[-2:].tolist() == [[10, 2, 10], [10, 10, 10]]
     _, findings = read("G61.1 ,K1\nG1 X10. F100.", "fanuc")
     assert codes(findings) == ["nc-not-read"]
+
+
+@pytest.mark.parametrize("loop", ["WHILE[#1LT3]DO1", "DO1"])
+def test_a_loop_that_does_not_end_is_a_finding(loop):
+    commands, findings = read(f"#1=0\n{loop}\nG1 X5. F100.\n#1=#1+1\nG0 X7.")
+    assert [(f.line, f.text.startswith("DO1: END1 is missing")) for f in findings] == [(6, True)]
+    assert ends(commands)[-1].tolist() == [7, 0, 10]
+
+
+def test_a_block_of_its_own_text_that_a_mitsubishi_calls():
+    body = "M98 H100 L3\nG90 G1 X20. F500\nM30\nN100 G91 G1 X1. F500\nM99"
+    commands, findings = read(body, "mitsubishi")
+    assert findings == []
+    assert ends(commands)[1:, 0].tolist() == [1, 2, 3, 20]
+    assert minutes(commands) == pytest.approx(20.0 / 500.0)
+    assert codes(read("M98 P200 H100\nM30\nO200\nN100 X1.\nM99", "mitsubishi")[1]) == ["nc-not-read"]
+
+
+def test_a_named_subprogram_of_an_okuma_is_called_once():
+    body = "CALL OCIRC DEP=4. PX=50.\nM2\nOCIRC\nG0 X=PX\nG1 Z=-DEP F200\nG3 I-10. F400\nRTS"
+    commands, findings = read(body, "okuma", head=HEAD.replace("G54", "G15 H1"))
+    assert findings == []
+    assert ends(commands)[1:].tolist() == [[50, 0, 10], [50, 0, -4], [50, 0, -4]]
+    assert minutes(commands) == pytest.approx(14.0 / 200.0 + math.tau * 10.0 / 400.0)

@@ -74,3 +74,14 @@ def test_changed_coordinates_of_a_mach3_are_left_out_until_they_end(on, off):
     assert codes(findings) == ["nc-left-out"]
     assert ends(commands)[-1].tolist() == [5, 0, 10]
     assert ends(commands)[:, 1].max() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("control", "away"), [("grbl", "G28 G91 Z0\nG90"), ("grbl", "G53 G0 Z-3"), ("linuxcnc", "G30")]
+)
+def test_a_home_position_that_nobody_states_is_no_motion(control, away):
+    commands, findings = read(f"G1 Z-1. F100\nG1 X20.\nG0 Z5.\n{away}\nG0 X0. Y0.", control, head=HEAD)
+    assert findings == []
+    assert ends(commands)[-2:].tolist() == [[20, 0, 5], [0, 0, 5]]
+    at_home = read(f"#5181=4 #5182=6 #5183=90\n{away}", control, head=HEAD)[0]
+    assert away != "G30" or ends(at_home)[-1].tolist() == [4, 6, 90]

@@ -64,7 +64,7 @@ def test_a_motion_that_is_not_read_does_not_move_until_another_motion(tmp_path: 
     assert gaps(reading) == [("nc-unknown-word", line) for line in (4, 5, 6)]
 
 
-@pytest.mark.parametrize("ending", [".gc", ".GC", ".gcd", ".din", ".g"])
+@pytest.mark.parametrize("ending", [".gc", ".GC", ".gcd", ".din", ".g", ".I"])
 def test_further_endings(tmp_path: Path, ending):
     assert ending.lower() in ENDINGS
     reading = read(tmp_path, MOVES + "M2\n", f"part{ending}")

@@ -72,7 +72,11 @@ def test_further_work_offsets_of_other_controllers(tmp_path: Path, name, text):
 
 def test_machine_coordinates_need_the_origin(tmp_path: Path):
     text = "G0 X0 Y0 Z5\nG53 G0 Z0\nM2\n"
-    assert gaps(read(tmp_path, text)) == [("nc-machine-coordinates", 2)]
+    bare = read(tmp_path, text)
+    assert gaps(bare) == []
+    assert bare.retractions == (2,)
+    assert bare.program.p_work[-1, 2] == pytest.approx(5.0)
+    assert gaps(read(tmp_path, "G0 X0 Y0 Z5\nG53 G0 X0\nM2\n")) == [("nc-machine-coordinates", 2)]
     reading = read(tmp_path, text, work_offsets={"G54": [0.0, 0.0, -150.0]})
     assert gaps(reading) == []
     assert reading.program.p_work[-1, 2] == pytest.approx(150.0)

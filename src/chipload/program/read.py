@@ -51,7 +51,7 @@ Dialect = Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"]
 
 #: endings of NC texts whose control is told from what they hold
 OF_TEXT = (
-    ".ngc", ".nc", ".gcode", ".gc", ".g", ".gco", ".gcd", ".tap", ".cnc", ".txt", ".iso", ".eia", ".ptp", ".din",
+    ".ngc", ".nc", ".gcode", ".gc", ".g", ".gco", ".gcd", ".tap", ".cnc", ".txt", ".iso", ".eia", ".ptp", ".din", ".i",
     ".min", ".ssb", ".anc", ".ncc", ".ncf", ".prg", ".pgm", ".pim", ".dnc", ".mcd", ".sub",
 )  # fmt: skip
 #: dialect by the ending of a file; None: that of the machine

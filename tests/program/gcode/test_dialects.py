@@ -149,8 +149,25 @@ def test_sinumerik_drilling_cycles():
     assert heights(commands) == [20, 2, -9, 2, 10, 2, -9, 2, 10]
     assert commands.feed[commands.motion == DWELL].tolist() == [0.5, 0.5]
     commands, _ = sinumerik(head + "CYCLE83(10,0,2,-9,,-5,,0,0,0,1,1)\nM30")
-    back = 5.0 - 0.254
-    assert heights(commands) == [20, 2, -5, 2, -back, -9, 2, 10]
+    assert heights(commands) == [20, 2, -5, 2, -4.4, -9, 2, 10]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected", "pauses"),
+    [
+        # strokes of 5, 5 - 2, then 2 while more than 4 are left; chips broken by 1 mm at the feed
+        ("10,0,2,-13,,-5,,2,0.5,0,1,0", [-5, -4, -8, -7, -10, -9, -11.5, -10.5, -13], [0.5] * 5),
+        # no degression: strokes as deep as the first, from RFP, not from RFP + SDIS
+        ("10,0,2,-12,,,5,0,0,0,1,0,,,0.2", [-5, -4.8, -10, -9.8, -12], []),
+        # each half of the one before it, 1 mm at least; back to RFP + SDIS, waiting there
+        ("10,0,2,-9,,-4,,-0.5,0,0.3,1,1,,1", [-4, 2, -3.4, -6, 2, -5.4, -7, 2, -6.4, -8, 2, -7.4, -9], [0.3] * 4),
+    ],
+)
+def test_plunges_of_a_sinumerik(arguments, expected, pauses):
+    commands, findings = sinumerik(f"G0 X0 Y0 Z20\nF60 S600 M3\nCYCLE83({arguments})\nM30")
+    assert heights(commands) == pytest.approx([20, 2, *expected, 2, 10])
+    assert commands.feed[commands.motion == DWELL].tolist() == pauses
+    assert Severity.UNPROVEN not in [f.severity for f in findings]
 
 
 def test_sinumerik_tapping():

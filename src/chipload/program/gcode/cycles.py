@@ -39,12 +39,19 @@ class PeckRule(NamedTuple):
     """How the pecks of a hole change [units of the text].
 
     ``shorter``: each peck is by that shorter than the one before it, and at least ``least`` where it is.
-    ``lift``: after that depth G73 goes to R; 0: it does not.
+    ``lift``: after that depth G73 goes to R; 0: it does not. ``heights``: where the pecks end, the bottom last, instead
+    of equal ones; ``back``: by how much such a peck goes or comes back, at its feed where chips are broken.
+    ``pause``: time [s] at R, where a drill waits before it goes in again; ``dwell``: time [s] at the bottom, and of
+    each peck where heights are stated.
     """
 
     shorter: float = 0.0
     least: float = 0.0
     lift: float = 0.0
+    heights: tuple[float, ...] = ()
+    back: float = RETURN
+    pause: float = 0.0
+    dwell: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +82,9 @@ def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
     if code in (870, FANUC_BACK_BORING):
         yield from _back_bore(a, b, hole) if code == 870 else _fanuc_back_bore(a, b, hole)
         return
-    if code in NEED_Q:
+    if hole.pecks.heights:
+        yield from _stated_pecks(code, a, b, hole)
+    elif code in NEED_Q:
         yield from _pecks(code, a, b, hole)
     else:
         if code in (740, 840):
@@ -137,7 +146,7 @@ def _pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         raise InputError(f"Q{hole.peck:g}: the depth of a peck must be above 0")
     if (hole.r - hole.bottom) / hole.peck > MOST_PECKS:
         raise InputError(f"Q{hole.peck:g}: makes more than {MOST_PECKS} pecks: raise it")
-    shorter, least, lift = hole.pecks
+    shorter, least, lift = hole.pecks[:3]
     if shorter < 0.0 or (shorter > 0.0 and not 0.0 < least <= hole.peck):
         raise InputError(
             f"I{hole.peck:g} J{shorter:g} K{least:g}: pecks become shorter by J, 0 or more, down to K, which must be "
@@ -156,6 +165,26 @@ def _pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         peck = max(peck - shorter, least) if shorter > 0.0 else peck
         depth -= peck
     yield LINE, a, b, hole.bottom, 0.0
+    if hole.pecks.dwell > 0.0:
+        yield DWELL, a, b, hole.bottom, hole.pecks.dwell
+
+
+def _stated_pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
+    """Pecks that end at stated heights, each with the time at its bottom."""
+    *heights, bottom = hole.pecks.heights
+    dwell, pause = hole.pecks.dwell, hole.pecks.pause
+    for height in heights:
+        yield LINE, a, b, height, 0.0
+        if dwell > 0.0:
+            yield DWELL, a, b, height, dwell
+        if code == 830:
+            yield RAPID, a, b, hole.r, 0.0
+            if pause > 0.0:
+                yield DWELL, a, b, hole.r, pause
+        yield RAPID if code == 830 else LINE, a, b, height + hole.pecks.back, 0.0
+    yield LINE, a, b, bottom, 0.0
+    if dwell > 0.0:
+        yield DWELL, a, b, bottom, dwell
 
 
 def _back_bore(a: float, b: float, hole: Hole) -> Iterator[Step]:

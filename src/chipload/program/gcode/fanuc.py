@@ -182,6 +182,12 @@ class Fanuc(Dialect):
         if 97 in block.m:
             block.m.remove(97)
             block.block_call = {"p": -1.0, **{x: block.words.pop(x) for x in "pl" if x in block.words}}
+        if 98 in block.m and "h" in block.words:
+            # a Mitsubishi calls the block N of its own text
+            if "p" in block.words:
+                raise NotReadError("M98: P with H: a subprogram from a block of it on")
+            block.m.remove(98)
+            block.block_call = {"p": block.words.pop("h"), **{x: block.words.pop(x) for x in "l" if x in block.words}}
         self._adapt(block, c)
         return lenient(block, c, UNREAD | LEFT_OUT)
 
@@ -330,6 +336,8 @@ class Fanuc(Dialect):
             if "p" in words and 40 not in g and 98 not in block.m:
                 seconds = seconds_of(block, c, "p")
                 words["p"] = 0.0 if seconds is None else seconds
+                if motion in NEED_Q:
+                    c.pecks = c.pecks._replace(dwell=max(words.pop("p"), 0.0))
 
     @staticmethod
     def _shorter_pecks(words: dict[str, float], g: list[int], motion: int, c: Controller) -> None:

@@ -68,8 +68,10 @@ def macro_step(flow: Flow, raw: str) -> bool:
         value, rest = _condition(flow, rest)
         if not re.fullmatch(r"do[1-9]", rest):
             raise InputError(f"{rest[:12]!r}: WHILE[...] is followed by DO and a number")
-        flow.line = flow.line + 1 if value else _end_of(flow.source, flow.line, rest[2:]) + 1
+        end = _end_of(flow.source, flow.line, rest[2:])
+        flow.line = flow.line + 1 if value else end + 1
     elif word.startswith("do"):
+        _end_of(flow.source, flow.line, word[2:])
         flow.line += 1
     else:
         flow.line = _head_of(flow.source, flow.line, word[3:])
@@ -127,10 +129,15 @@ def _marks(source: Source, k: int, pattern: str) -> bool:
 
 
 def _end_of(source: Source, line: int, number: str) -> int:
-    for k in range(line + 1, len(source.lines)):
-        if _marks(source, k, rf"^{_START}end{number}$"):
-            return k
-    raise InputError(f"DO{number}: END{number} is missing")
+    """Line of the END of a DO, sought once."""
+    if line not in source.loop_ends:
+        source.loop_ends[line] = next(
+            (k for k in range(line + 1, len(source.lines)) if _marks(source, k, rf"^{_START}end{number}$")), None
+        )
+    end = source.loop_ends[line]
+    if end is None:
+        raise InputError(f"DO{number}: END{number} is missing")
+    return end
 
 
 def _head_of(source: Source, line: int, number: str) -> int:

@@ -327,12 +327,14 @@ def _shift(c: Controller, code: int, axes: Axes) -> None:
 def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
     """Whether a motion in the machine's coordinates is left out, as where they lie is not known; a finding says so.
 
-    Fanuc and Sinumerik alone, where it leads to the reference point; LinuxCNC keeps its offsets in the parameters. A
-    motion along Z is a retraction; one in X and Y before it may go through the work, which stays unproven.
+    A strict LinuxCNC takes the offsets and home positions of its parameters, unset ones as 0; so does one whose
+    parameters state any. A motion along Z is a retraction; one in X and Y before it may go through the work, which
+    stays unproven.
     """
     number = c.state.datum.number
+    stated = c.strict or any(5161 <= k < 5390 for k in c.parameters.numbered)
     if (
-        c.control.offsets.kept_in_parameters
+        (c.control.offsets.kept_in_parameters and stated)
         or number in c.stated_offsets
         or number == 0
         or not any(k in LINEAR for k in axes)

@@ -52,6 +52,7 @@ class Source:
     numbers : line of a bare ``o`` by label: a subroutine in the manner of Fanuc
     blocks : lines by N word, where GOTO has asked for one
     statements : jumps and loops of a Sinumerik, where one was reached
+    loop_ends : line of END by that of its DO, where one was reached; None: there is none
     """
 
     name: str
@@ -62,6 +63,7 @@ class Source:
     numbers: dict[str, int] = field(default_factory=dict)
     blocks: dict[int, list[int]] | None = None
     statements: Statements | None = None
+    loop_ends: dict[int, int | None] = field(default_factory=dict)
 
     def keyword(self, line: int) -> str:
         """Keyword on a line."""
