@@ -142,6 +142,18 @@ def test_a_material_that_is_not_shipped_is_named(program: Path, tmp_path: Path) 
     assert f'question: [material]: which material is it? name = "al7075-t6": {why}' in said
 
 
+def test_the_place_of_an_origin_is_no_material() -> None:
+    assert read_header("(Z Origin for Material  = Material Surface)").unknown_material == ""
+    assert read_header("(MATERIAL = DELRIN)").unknown_material == "DELRIN"
+
+
+def test_a_machine_that_is_too_small_is_a_question(tmp_path: Path) -> None:
+    text = "%\nO1\nG21 G90 G54\nT1 M6\nS3000 M3\nG0 X-50. Y0. Z10.\nG1 Z-2. F500.\nX2050. F1500.\nG0 Z50.\nM30\n%\n"
+    (tmp_path / "plate.nc").write_text(text)
+    _, said, _ = call("init", tmp_path / "plate.nc", tmp_path / "job")
+    assert "too small: X goes from -50 to 2050 mm, 2100 mm; travel, speeds" in said
+
+
 def test_a_drill_has_a_point_and_two_flutes(program: Path, tmp_path: Path) -> None:
     program.write_text(FUSION.replace("(T3 D=8. CR=0. - ZMIN=-2. - flat end mill)", "(T3 | 8. DRILL | H3 | D3)"))
     call("init", program, tmp_path / "job")

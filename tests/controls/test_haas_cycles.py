@@ -73,3 +73,26 @@ def test_a_pause_at_the_bottom_of_a_pecked_hole(control, text, time):
     commands, findings = read(f"G83 X5. Y0. Z-4. R2. Q3. {text} F100.\nX9.\nG80", control)
     assert findings == []
     assert dwells(commands) == ([] if time is None else [time, time])
+
+
+@pytest.mark.parametrize("text", ["G13 I5. D1 F200.", "G70 I25. J15. L4"])
+@pytest.mark.parametrize("control", ["fanuc", "okuma"])
+def test_a_fanuc_has_no_circular_pockets(control, text):
+    head = "G21 G17 G90 G94\nT1 M6\nS1000 M3\nG0 X0. Y0. Z10.\n"
+    commands, findings = read(f"{text}\nG1 X7. F100.", control, head=head)
+    assert [f.line for f in findings] == [5]
+    assert ends(commands)[-2:].tolist() == [[0, 0, 10], [7, 0, 10]]
+
+
+@pytest.mark.parametrize("control", ["mitsubishi", "brother", "mazak"])
+def test_other_controls_with_circular_cutting(control):
+    """From the centre on a half circle of 2.5 mm radius, round, and back."""
+    commands, findings = read("G13 I5. D0 F200.", control)
+    assert findings == []
+    assert minutes(commands) == pytest.approx(math.pi * (2.5 + 10.0 + 2.5) / 200.0)
+
+
+def test_a_tap_in_step_with_the_feed_makes_no_corner():
+    commands, findings = read("G84 X5. Y0. Z-8. R2. F1250. ,R1\nX9.\nG80", "mitsubishi")
+    assert findings == []
+    assert ends(commands)[ends(commands)[:, 2] == -8.0].tolist() == [[5, 0, -8], [9, 0, -8]]

@@ -141,3 +141,13 @@ def test_names_and_comments_of_a_program_are_no_gaps(tmp_path, head):
     assert reading.program.p_work[-1].tolist() == [0.0, 0.0, -1.0]
     if head.startswith("<"):
         assert reading.recognition.control.name == "fanuc"
+
+
+def test_a_control_that_would_cut_at_thousandths_of_the_feed_is_not_the_one(tmp_path: Path):
+    """F50 beside F100.: a Haas would cut at 0.05 mm/min, which nobody programs."""
+    (tmp_path / "part.nc").write_text(ISO.format("G1 X10. F50"))
+    reading = read_program(tmp_path / "part.nc", VMC)
+    found = [f for f in reading.findings if f.code == "nc-control"]
+    assert [f.severity for f in found] == [Severity.NOTE]
+    assert "Haas NGC would cut at 0.05 mm/min" in found[0].text
+    assert reading.commands.feed.max() * 60.0 == pytest.approx(100.0)

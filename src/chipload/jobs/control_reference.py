@@ -54,6 +54,7 @@ _ROTARY = {
 }
 _STARTS = {"none": "no cycle", "tapping": "tapping cycles", "all": "every cycle, where the spindle rests"}
 _UNIT = {"mm": "mm", "inch": "inch", "setting": "a setting of the machine: unproven until stated"}
+_CIRCLES = "patterns of holes, circular pockets"
 #: more codes that the Fanuc reader carries out, by what they do
 _FANUC = {
     "polar, scaled and mirrored coordinates": (coordinates.POLAR, coordinates.NO_POLAR, coordinates.SCALED,
@@ -66,8 +67,8 @@ _FANUC = {
     "rigid tapping": tuple(fanuc.TAPPING),
     "probing": (fanuc.SKIP,),
     "more work offsets, tip control": (fanuc.EXTENDED, fanuc.HAAS_EXTENDED, fanuc.HAAS_TIP),
-    "patterns of holes, circular pockets": (haas_cycles.CIRCLE, haas_cycles.ARC_OF_HOLES, haas_cycles.LINE_OF_HOLES,
-                                            *haas_cycles.POCKETS),
+    _CIRCLES: (haas_cycles.CIRCLE, haas_cycles.ARC_OF_HOLES, haas_cycles.LINE_OF_HOLES,
+               *haas_cycles.POCKETS),
 }  # fmt: skip
 
 
@@ -176,7 +177,8 @@ def _blocks(control: Control, family: bool = False) -> list[str]:
     silent = fanuc.IDLE if family else frozenset[int]()
     rows = [(_GROUPS[name], _codes(set(codes) - other - silent)) for name, codes in GROUPS.items()]
     if family:
-        rows += [(what, _codes(set(codes) - other)) for what, codes in _FANUC.items()]
+        own = {what: codes for what, codes in _FANUC.items() if control.cycles.circles or what != _CIRCLES}
+        rows += [(what, _codes(set(codes) - other)) for what, codes in own.items()]
     if control.text.user_tasks:
         rows.append(
             ("user tasks", "VC1 (taken as #501), local names, X=VC1*2, CALL O Q, RTS, MODIN, MODOUT, IF [ ] N, GOTO N")

@@ -99,6 +99,7 @@ class CycleRules:
     dwell_optional : P may be missing
     starts_spindle : ``none``, ``tapping``, or ``all``: cycles that start a spindle at rest
     peck_letters : I, J and K of G73 and G83 are pecks that become shorter
+    circles : G12 and G13 with I mill circular pockets; G70 to G72 with I and L are patterns of holes
     feeds_to_r : G74, G84 and G89 go at their feed up to R, then at rapid to the level of G98; else at feed to there
     keeps_data : another cycle takes R, the bottom, Q and P of the one before it; else it states them
     keeps_places : a cycle keeps the places of R and its bottom where G90 and G91 change; else their values
@@ -109,6 +110,7 @@ class CycleRules:
     dwell_optional: bool
     starts_spindle: str
     peck_letters: bool
+    circles: bool
     feeds_to_r: bool
     keeps_data: bool
     keeps_places: bool

@@ -5,6 +5,7 @@ A guess that changes path or time leaves the result unproven until the job state
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 
@@ -19,12 +20,14 @@ from chipload.program.gcode.tools import ToolTable
 from chipload.program.recognise import Recognition, guess_unit, states_distance, states_unit
 from chipload.program.reconcile import StatedDiameter
 from chipload.program.setup import StatedControl
-from chipload.units import MM_PER
+from chipload.units import MM_PER, mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 
 #: a block that takes longer is a wrong feed [s]
 LONGEST_BLOCK = 1e4 * 60.0
+#: no mill cuts at a lower feed [mm/min]: a control that would is not the one
+LEAST_FEED_MM_MIN = 0.5
 #: a dwell that is longer, or all dwells longer than this share of the program, ask for their unit [s]
 LONGEST_DWELL, DWELL_SHARE = 60.0, 0.5
 #: two diameters that differ by a smaller share are one
@@ -102,12 +105,21 @@ def control_findings(found: Recognition, text: str, commands: Commands, other: C
         return (Finding("nc-control", 0, f"{said}; {found.other.title} reads it in the same way"),)
     if other is None:
         difference = f"{found.other.title} does not read it"
+    elif _least_feed(other) < LEAST_FEED_MM_MIN <= _least_feed(commands):
+        slow = f"{found.other.title} would cut at {number_text(_least_feed(other))} mm/min"
+        return (Finding("nc-control", 0, f"{said}; {slow}: {remedy} if it is not"),)
     else:
         a, b = (programmed_minutes(x) for x in (commands, other))
         difference = (
             f"{found.other.title} reads it otherwise: {number_text(b)} min at the programmed feeds instead of {a:.4g}"
         )
     return (Finding("nc-control", 0, f"{said}; {difference}: {remedy}", Severity.UNPROVEN),)
+
+
+def _least_feed(commands: Commands) -> float:
+    """Least feed of a cut [mm/min]; infinite where nothing cuts."""
+    cuts = np.isin(commands.motion, (LINE, ARC)) & (commands.feed > 0.0)
+    return mm_min_from_mm_s(float(commands.feed[cuts].min())) if cuts.any() else math.inf
 
 
 def same_motions(a: Commands, b: Commands) -> bool:

@@ -67,7 +67,11 @@ _ALLOY = re.compile(
     r"MATERIAL|STOCK|WERKSTOFF|WORKPIECE|ALLOY|BILLET|BLANK|PLATE|\b(?:AL|AA|EN|AISI|SAE)|\bT[0-9]{1,4}\b",
     re.IGNORECASE,
 )
-_NAMED_MATERIAL = re.compile(r"\b(?:MATERIAL|WERKSTOFF|STOCK\s+MATERIAL)\s*[-:=]+\s*([^-:=\s][^\n]*)", re.IGNORECASE)
+_NAMED_MATERIAL = re.compile(
+    # Z Origin for Material = Material Surface names none
+    r"\b(?:MATERIAL|WERKSTOFF|STOCK\s+MATERIAL)\s*[-:=]+\s*(?!MATERIAL\b|TABLE\b|MACHINE\b|.*\bSURFACE)([^-:=\s][^\n]*)",
+    re.IGNORECASE,
+)
 _MATERIALS = (
     (r"\b304L?\b|\b316L?\b|1\.430[0-9]|1\.440[0-9]", "stainless-304-316l-from-group-14"),
     (r"STAINLESS|1\.43\d\d|1\.44\d\d|INOX", "group-14-stainless"),

@@ -453,6 +453,9 @@ def _machine_table(chosen: _Chosen, known: Known) -> DraftTable:
         return DraftTable("machine", (Entry(key, known.machine),))
     axes = "".join(a.letter for a in machine.chain.axes)
     note = f"the first shipped one with the axes {axes}; chipload machines lists all"
+    short = [f.text.split(":")[0] for f in chosen.reading.violations if f.code == "machine-limit"]
+    if short:
+        note += f"; too small: {short[0]}"
     return DraftTable("machine", (Entry("name", machine.name, note, True),))
 
 

@@ -64,6 +64,7 @@ _COLON = re.compile(r"^([ \t]*):(?=[0-9]+[ \t]*(?:\(|$))", re.MULTILINE)
 _PLACE = re.compile(r"^([ \t]*):(?=[0-9])", re.MULTILINE)
 _FILE = re.compile(r"^\$[^\n%]*%[ \t]*$", re.MULTILINE)
 _SKIP = re.compile(r"^/[1-9]")
+_TAP = re.compile(r"g(?:84|74)(?![0-9.])")
 #: rounding or chamfer of the corner behind a motion, and an angle or what else stands behind a comma
 _CORNER = re.compile(r",([rc])([-+]?[0-9.]+|#[0-9]+|\[[^\]]*\])")
 
@@ -452,7 +453,8 @@ def _corners(text: str, c: Controller) -> str:
     """
     if "," not in text or OUTPUTS.match(text):
         return text
-    if any(code_text(code).lower() in text for code in c.control.text.no_corners):
+    if any(code_text(code).lower() in text for code in c.control.text.no_corners) or _TAP.search(text):
+        # ,R1 of a tap asks for a spindle in step with the feed
         return _CORNER.sub("", text)
     for found in _CORNER.finditer(text):
         size = read_value(found[2], 0, c.parameters)[0] * c.state.scale

@@ -35,7 +35,7 @@ def hole_pattern(block: Block, c: Controller) -> None:
     """Put the holes of a pattern behind the block, each as a block of its own."""
     code = next((x for x in block.g if x in (CIRCLE, ARC_OF_HOLES, LINE_OF_HOLES)), None)
     words, state = block.words, c.state
-    if code is None or not {"i", "l"} <= words.keys():
+    if code is None or not {"i", "l"} <= words.keys() or not c.control.cycles.circles:
         return
     block.g.remove(code)
     cycle = next((x for x in block.g if x in CYCLES), state.motion)
@@ -60,6 +60,8 @@ def circular_pocket(block: Block, c: Controller) -> bool:
     if code is None or "i" not in words:
         return False
     name, scale = code_text(code), state.scale
+    if not c.control.cycles.circles:
+        raise NotReadError(f"{name}: a circular pocket, which this control does not have")
     if state.plane != 170 or state.compensation != 400:
         raise NotReadError(f"{name}: circular pockets lie in G17, without G41 and G42")
     number = integer_of(words.get("d", 0.0), "D")
