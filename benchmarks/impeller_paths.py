@@ -1,21 +1,31 @@
 """The compiled loops of an impeller's paths beside the same in NumPy, in processor time of one run.
 
-    python benchmarks/impeller_paths.py
+    python benchmarks/impeller_paths.py [--lines]
+
+``--lines``: only the processor time of the finishing lines on a part of a blade, with scallop, pallet angles and the
+walls between the check points, the second of two times.
 
 A piece of a blade of the impeller by formula, two lines 1.2 mm apart, 200 places along them, 15 between them; 20,000
 points of the blade's surface.
 """
 
+import argparse
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch, basis
 from chipload.planning.impeller import _scallop
+from chipload.planning.impeller.covering.covering import covering_of
+from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
+from chipload.planning.impeller.paths import PatchFinish, finish_tracks
 from chipload.planning.impeller.scallop_height import distance, shares
+from chipload.planning.impeller.settings import channel_scene
+from chipload.planning.impeller.surfaces import ContactSampling, hub_range
 from chipload.planning.impeller.track import pose_cutter
 
 CUTTER, TABLE, WIDE = CatalogueCutter(12.0, 2.0), math.radians(55.0), 8
@@ -69,8 +79,27 @@ def timed(work, times: int = 5) -> tuple[object, float]:
     return out, min(took)
 
 
+def time_lines() -> None:
+    """Print the processor time of the finishing lines on a part of a blade, as the impeller example asks for them."""
+    impeller = impeller_of(ImpellerShape())
+    scene = channel_scene(impeller, ContactSampling((0.0, 1.0), (0.0, 1.0), (2, 2), 1.0, 2.0))
+    covering = covering_of(impeller, 0.05, CUTTER.corner_radius, 1, hub_range(impeller, 0.0))
+    scene = replace(scene, covering=covering, known=scene.tree)
+    finish = PatchFinish(0.1, LineMotion(0.005, 100.0 / 60.0, 0.5, 0.5, scallop=0.1), 1.5)
+    for _ in range(2):
+        begin = time.process_time()
+        found = finish_tracks(impeller.blade.plus, "u", ((0.05, 0.95), (0.35, 0.98)), scene, 0, CUTTER, TABLE, finish)
+        took = time.process_time() - begin
+    print(f"{found.lines} lines, {found.length:.6f} mm, {len(found.missed)} missed spans: {took:.2f} s")
+
+
 def main() -> None:
     """Print the table."""
+    ask = argparse.ArgumentParser(description=__doc__)
+    ask.add_argument("--lines", action="store_true", help="only the finishing lines on a part of a blade")
+    if ask.parse_args().lines:
+        time_lines()
+        return
     patch = impeller_of(ImpellerShape()).blade.plus
     rng = np.random.default_rng(1)
     u, v = rng.random(20000), rng.random(20000)

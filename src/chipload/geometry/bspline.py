@@ -11,6 +11,7 @@ Reference: [Piegl1997] ch. 2, 9.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +24,22 @@ _bspline = LateModule("chipload.geometry._bspline")
 Floats = NDArray[np.float64]
 
 _NO_NORMAL = "patch: no normal where S_u and S_v are parallel: exclude that edge"
+
+
+class LocalShape(NamedTuple):
+    """A surface near k points of it.
+
+    Parameters
+    ----------
+    points, normals : S [mm], unit normals (k, 3)
+    curvatures : K (k, 3, 3) [1/mm]
+    tangents : S_u and S_v (2, k, 3) [mm]
+    """
+
+    points: Floats
+    normals: Floats
+    curvatures: Floats
+    tangents: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +112,10 @@ class BSplinePatch:
         InputError
             S_u and S_v are parallel or 0 there.
         """
-        cross = np.cross(self.at(u, v, 1, 0), self.at(u, v, 0, 1))
-        length = np.linalg.norm(cross, axis=1)
-        if (length == 0.0).any():
-            raise InputError(_NO_NORMAL)
-        out: Floats = self.side * cross / length[:, None]
-        return out
+        return self.facing(u, v)[1]
 
     def facing(self, u: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
-        """Points [mm] and unit normals (k, 3): as :meth:`at` and :meth:`normal`, in a third of the time.
+        """Points [mm] and unit normals (k, 3): in a third of the time of :meth:`at` and derivatives.
 
         Raises
         ------
@@ -122,15 +134,34 @@ class BSplinePatch:
             raise InputError(_NO_NORMAL)
         return points, normals
 
+    def shape(self, u: ArrayLike, v: ArrayLike) -> LocalShape:
+        """Points, normals, curvature tensors and tangents: as the other methods, in a tenth of their time.
+
+        Raises
+        ------
+        InputError
+            A parameter is outside the range of the knots, or S_u and S_v are parallel or 0 there.
+
+        Examples
+        --------
+        >>> flat = patch_through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
+        >>> shape = flat.shape(0.5, 0.5)
+        >>> shape.points.tolist(), shape.normals.tolist(), shape.tangents[:, 0].tolist()
+        ([[1.5, 1.0, 0.0]], [[0.0, 0.0, 1.0]], [[3.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+        """
+        a, b = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
+        p, q = self.degrees
+        x, y = a.ravel(), b.ravel()
+        _require_within(self.knots_u, p, x)
+        _require_within(self.knots_v, q, y)
+        out = LocalShape(*(np.empty(size) for size in ((len(x), 3), (len(x), 3), (len(x), 3, 3), (2, len(x), 3))))
+        if not _bspline.shape_of(self.knots_u, self.knots_v, self.control, self.side, p, q, x, y, *out):
+            raise InputError(_NO_NORMAL)
+        return out
+
     def curvature(self, u: ArrayLike, v: ArrayLike) -> Floats:
         """Curvature tensors K (k, 3, 3) [1/mm], positive towards :meth:`normal`."""
-        N = self.normal(u, v)
-        J = np.stack([self.at(u, v, 1, 0), self.at(u, v, 0, 1)], axis=-1)
-        second = [np.einsum("kd,kd->k", self.at(u, v, *d), N) for d in ((2, 0), (1, 1), (0, 2))]
-        II = np.stack([np.stack(second[:2], axis=-1), np.stack(second[1:], axis=-1)], axis=-2)
-        A = np.linalg.solve(np.swapaxes(J, 1, 2) @ J, np.swapaxes(J, 1, 2))
-        out: Floats = np.swapaxes(A, 1, 2) @ II @ A
-        return out
+        return self.shape(u, v).curvatures
 
     def principal(self, u: ArrayLike, v: ArrayLike) -> Floats:
         """Principal curvatures (k, 2) [1/mm], ascending."""

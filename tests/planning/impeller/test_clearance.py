@@ -69,3 +69,21 @@ def test_moves_proved_clear_are_clear_at_every_instant():
             # not proved: nearer than the margin somewhere, or by so little above it that 2^14 parts do not tell
             assert least < 0.35
     assert 10 < said.sum() < n - 10
+
+
+def test_rows_of_contact_points_hold_tangents_and_the_curvature_in_them():
+    rng = np.random.default_rng(6)
+    N = rng.normal(size=(40, 3))
+    N /= np.linalg.norm(N, axis=1)[:, None]
+    N[0], N[1] = (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)
+    K = rng.normal(size=(40, 3, 3))
+    K = K + K.transpose(0, 2, 1)
+    S, points = rng.normal(size=(40, 3)), np.zeros((1, 3))
+    rows = Scene(S, N, K, np.full(40, 7), points, np.zeros(1, int), 0.0).rows
+    frames = rows[:, 3:12].reshape(-1, 3, 3)
+    np.testing.assert_array_equal(rows[:, :6], np.hstack([S, N]))
+    np.testing.assert_allclose(frames @ frames.transpose(0, 2, 1), np.tile(np.eye(3), (40, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(frames), 1.0)
+    inside = frames @ K @ frames.transpose(0, 2, 1)
+    np.testing.assert_allclose(rows[:, 12:15], inside[:, [1, 1, 2], [1, 2, 2]], atol=1e-12)
+    assert (rows[:, 15] == 7).all()

@@ -1,10 +1,12 @@
 """The pallet angle along a line: within its ranges, without jumps, split where it must be."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
+from chipload.planning.impeller import _pallet
 from chipload.planning.impeller.pallet import pallet_angles
 
 
@@ -64,3 +66,43 @@ def test_led_to_a_wide_step_over_where_the_ranges_allow_it():
     assert only.last == 20
     assert only.pallet[0] > 1.2
     assert only.pallet[-1] <= 0.9
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_row_of_states_is_the_cheapest_of_all(seed):
+    """Five points of one or two ranges with two or three states each: every row of states is tried."""
+    rng = np.random.default_rng(seed)
+    counts, turn = rng.integers(1, 3, 5), 4000.0
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    # some ranges lie a whole turn away
+    low = rng.uniform(-0.3, 0.3, starts[-1]) + math.tau * rng.integers(-1, 2, starts[-1])
+    ranges = np.column_stack([low, low + rng.uniform(0.2, 0.6, starts[-1])])
+    states = [
+        [(B, rng.uniform(0.0, 1.0), k) for k in range(count) for B in np.linspace(*ranges[first + k], 5)[1:4]]
+        for first, count in zip(starts, counts, strict=False)
+    ]
+    length, most = rng.uniform(0.2, 2.0, 4), rng.uniform(0.2, 0.5, 4)
+
+    def cost_of(row):
+        total = row[0][1]
+        for i, (a, b) in enumerate(itertools.pairwise(row)):
+            step = math.remainder(b[0] - a[0], math.tau)
+            one, two = ranges[starts[i] + a[2]], ranges[starts[i + 1] + b[2]]
+            two = two + math.tau * round((one.mean() - two.mean()) / math.tau)
+            if abs(step) > most[i] or min(one[1], two[1]) <= max(one[0], two[0]):
+                return math.inf
+            total += 1e-3 * turn * step**2 / length[i] + b[1] * length[i]
+        return total
+
+    # as far as a row goes
+    best, last = min((cost_of(row), 5) for row in itertools.product(*states)), 5
+    while not math.isfinite(best[0]):
+        last -= 1
+        best = min((cost_of(row), last) for row in itertools.product(*states[:last]))
+    flat = [one for point in states for one in point]
+    first = np.concatenate([[0], np.cumsum([len(point) for point in states])])
+    chosen = np.zeros(5, dtype=np.int64)
+    angle, cost, of = (np.array(x) for x in zip(*flat, strict=True))
+    got = _pallet.cheapest_row(ranges, starts, angle, cost, of, first, length, most, turn, 0, chosen)
+    assert got == last
+    assert cost_of([flat[k] for k in chosen[:last]]) == pytest.approx(best[0], rel=1e-12)

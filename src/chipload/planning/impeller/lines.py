@@ -107,7 +107,9 @@ class Tracks:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line at the stations: (u, v), S, N, K, its direction, the sections with B, B at every station (nan: none)."""
+    """A line at the stations: (u, v), S, N, K, its direction d and e = N x d, the sections with B, B at every station
+    (nan: none), and the length (n - 1,) [mm] from station to station.
+    """
 
     q: Floats
     at: Floats
@@ -115,6 +117,8 @@ class Line:
     N: Floats
     K: Floats
     d: Floats
+    e: Floats
+    size: Floats
     sections: tuple[Turned, ...]
     pallet: Floats
 
@@ -174,7 +178,7 @@ class Lines:
         pallet = np.full(len(q), np.nan)
         for piece in pieces:
             pallet[piece.first : piece.last] = piece.pallet
-        return Line(q, at, S, N, K, d, pieces, pallet)
+        return Line(q, at, S, N, K, d, np.cross(N, d), step, pieces, pallet)
 
     def _line_sections(
         self, scene: Scene, step: Floats, before: Floats, widths: Callable[[Ints, Floats], Floats]
@@ -258,8 +262,7 @@ class Lines:
 
     def _reached_stations(self, stations: Ints, q: Floats) -> Flags:
         u, v = self.places(self.p[stations], q)
-        S, N, K = (f(u, v) for f in (self.surface.at, self.surface.normal, self.surface.curvature))
-        scene = self.scene.at_contacts(S, N, K, self.number)
+        scene = self.scene.at_contacts(*self.surface.shape(u, v)[:3], self.number)
         got = self._valid(scene, np.arange(len(stations)), self.pallets)
         return np.array([len(r) > 0 for r in got])
 
@@ -328,16 +331,11 @@ class Lines:
     def on(self, q: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """S, N, K, direction of the line and (u, v) at the stations."""
         u, v = self.places(self.p, q)
-        Sp, Sq = (self.surface.at(u, v, *x) for x in (((1, 0), (0, 1)) if self.along == "u" else ((0, 1), (1, 0))))
+        S, N, K, tangents = self.surface.shape(u, v)
+        Sp, Sq = tangents if self.along == "u" else tangents[::-1]
         d = Sp + self.sign * np.gradient(q, self.p)[:, None] * Sq
         d /= np.linalg.norm(d, axis=1)[:, None]
-        return (
-            self.surface.at(u, v),
-            self.surface.normal(u, v),
-            self.surface.curvature(u, v),
-            d,
-            np.column_stack([u, v]),
-        )
+        return S, N, K, d, np.column_stack([u, v])
 
     def _wall_contacts(
         self, S: Floats, N: Floats, pieces: tuple[Turned, ...], exact: Sequence[Sequence[float]]

@@ -18,7 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chipload.lazy import LateModule
 from chipload.planning.impeller.scene import Floats, Ints
+
+_pallet = LateModule("chipload.planning.impeller._pallet")
 
 #: widest distance of states of one range, and most of them
 _STEP, _MOST, _FEWEST = math.radians(2.0), 60, 5
@@ -69,18 +72,22 @@ def pallet_angles(
     [(0, 2), (2, 3)]
     """
     joined = [_join_ends(r) for r in ranges]
-    draw = np.full(len(ranges), np.nan) if preferred is None else preferred
-    states = [_states(r, wanted, p) for r, p in zip(joined, draw, strict=True)]
+    counts = np.array([len(r) for r in joined], dtype=np.int64)
+    line = _LineStates.of_ranges(
+        np.concatenate([*joined, np.zeros((0, 2))]), np.concatenate([[0], np.cumsum(counts)]), wanted,
+        np.full(len(ranges), np.nan) if preferred is None else np.array(preferred, dtype=np.float64),
+    )  # fmt: skip
     if widths is not None:
-        _add_paths(states, widths)
+        line.add_paths(widths)
     out: list[Turned] = []
+    chosen = np.zeros(len(ranges), dtype=np.int64)
     i = 0
     while i < len(ranges):
-        if not len(joined[i]):
+        if not counts[i]:
             i += 1
             continue
-        piece, last = _best(joined, states, length, most, i)
-        out.append(Turned(i, last, _smooth(joined, piece, length, most, i, wanted)))
+        last = line.row(length, most, i, chosen)
+        out.append(Turned(i, last, line.smooth(chosen[i:last], length, most, i, wanted)))
         i = last
     return tuple(out)
 
@@ -92,100 +99,68 @@ def _join_ends(ranges: Floats) -> Floats:
     return np.vstack([r[1:-1], [[r[-1, 0], r[0, 1] + math.tau]]]) if over else r
 
 
-def _states(ranges: Floats, wanted: float, preferred: float) -> Floats:
-    """Rows (K, 3): B, its cost, which range."""
-    rows = []
-    for k, (low, high) in enumerate(ranges):
-        count = int(np.clip(math.ceil((high - low) / _STEP), _FEWEST, _MOST))
-        B = low + (high - low) * (np.arange(count) + 0.5) / count
-        depth = np.minimum(B - low, high - B) / wanted
-        cost = np.clip(1.0 - depth, 0.0, None) ** 2
-        if math.isfinite(preferred):
-            cost = cost + _DRAW * np.abs(_near(B - preferred))
-        rows.append(np.column_stack([B, cost, np.full(count, k)]))
-    return np.vstack(rows) if rows else np.zeros((0, 3))
+@dataclass(frozen=True, eq=False)
+class _LineStates:
+    """States of a line, point after point: B, cost, number of the range at its point; first state of each point.
 
+    ``ranges`` (k, 2) of all points, ``starts`` (n + 1,) the first of each.
+    """
 
-def _add_paths(states: list[Floats], widths: Callable[[Ints, Floats], Floats]) -> None:
-    """Adds to the cost of the states how much longer the path is than with the widest step-over of the point."""
-    point = np.repeat(np.arange(len(states)), [len(s) for s in states])
-    if not len(point):
-        return
-    w = widths(point, np.concatenate([s[:, 0] for s in states]))
-    first = 0
-    for s in states:
-        own = w[first : first + len(s)]
-        first += len(s)
-        most = float(own.max(initial=0.0))
-        if most > 0.0:
-            s[:, 1] += _WIDE * (most / np.maximum(own, _LEAST * most) - 1.0)
+    ranges: Floats
+    starts: Ints
+    angle: Floats
+    cost: Floats
+    of: Ints
+    first: Ints
+
+    @staticmethod
+    def of_ranges(ranges: Floats, starts: Ints, wanted: float, preferred: Floats) -> _LineStates:
+        """The states of ranges; ``preferred`` (n,) [rad], nan: none."""
+        room = len(ranges) * _MOST
+        angle, cost, of = np.empty(room), np.empty(room), np.empty(room, dtype=np.int64)
+        first = np.zeros(len(starts), dtype=np.int64)
+        count = _pallet.states_of(
+            ranges, starts, preferred, wanted, _STEP, _FEWEST, _MOST, _DRAW, angle, cost, of, first
+        )
+        return _LineStates(ranges, starts, angle[:count], cost[:count], of[:count], first)
+
+    def add_paths(self, widths: Callable[[Ints, Floats], Floats]) -> None:
+        """Add to the cost of the states how much longer the path is than with the widest step-over of the point."""
+        if not len(self.angle):
+            return
+        count = np.diff(self.first)
+        w = widths(np.repeat(np.arange(len(count)), count), self.angle)
+        some = count > 0
+        most = np.repeat(np.maximum.reduceat(w, self.first[:-1][some]), count[some])
+        wide = most > 0.0
+        self.cost[wide] += _WIDE * (most[wide] / np.maximum(w[wide], _LEAST * most[wide]) - 1.0)
+
+    def row(self, length: Floats, most: Floats, begin: int, chosen: Ints) -> int:
+        """Write the states from a point on, as far as they go, to ``chosen`` (n,); the point after the last."""
+        return int(
+            _pallet.cheapest_row(
+                self.ranges, self.starts, self.angle, self.cost, self.of, self.first, length, most, _TURN, begin, chosen
+            )
+        )
+
+    def smooth(self, chosen: Ints, length: Floats, most: Floats, first: int, wanted: float) -> Floats:
+        """B without jumps of whole turns, drawn towards the mean of the neighbours, within the ranges and the steps."""
+        B = self.angle[chosen]
+        out: Floats = B[0] + np.concatenate([[0.0], np.cumsum(_near(np.diff(B)))])
+        if len(out) < 3:
+            return out
+        own = self.ranges[self.starts[first : first + len(out)] + self.of[chosen]] + (out - B)[:, None]
+        width = own[:, 1] - own[:, 0]
+        inset = np.minimum(np.maximum(_INSET * width, np.minimum(0.5 * wanted, 0.25 * width)), 0.5 * width)
+        # a state of the search is never nearer to an end than this
+        low, high = np.minimum(own[:, 0] + inset, out), np.maximum(own[:, 1] - inset, out)
+        a, b = length[first : first + len(out) - 2], length[first + 1 : first + len(out) - 1]
+        share = (a / np.where(a + b > 0.0, a + b, 1.0)).clip(0.0, 1.0)
+        _pallet.smooth_angles(out, low, high, share, most[first : first + len(out) - 1], _ROUNDS)
+        return out
 
 
 def _near(angle: Floats) -> Floats:
     """Angles less whole turns, from -pi to pi."""
     out: Floats = angle - math.tau * np.round(angle / math.tau)
-    return out
-
-
-def _overlap(a: Floats, b: Floats) -> Floats:
-    """(k, m) whether the ranges of two neighbours overlap."""
-    shift = math.tau * np.round((a.mean(axis=1)[:, None] - b.mean(axis=1)[None]) / math.tau)
-    low = np.maximum(a[:, None, 0], b[None, :, 0] + shift)
-    high = np.minimum(a[:, None, 1], b[None, :, 1] + shift)
-    out: Floats = high > low
-    return out
-
-
-def _best(
-    ranges: list[Floats], states: list[Floats], length: Floats, most: Floats, first: int
-) -> tuple[tuple[Floats, Ints], int]:
-    """States from ``first`` on as far as they go: their B and ranges, and the point after the last."""
-    cost = states[first][:, 1]
-    came: list[Ints] = []
-    i = first
-    while i + 1 < len(states) and len(states[i + 1]):
-        a, b = states[i], states[i + 1]
-        step = np.abs(_near(b[None, :, 0] - a[:, None, 0]))
-        goes = _overlap(ranges[i], ranges[i + 1])[a[:, 2].astype(int)][:, b[:, 2].astype(int)]
-        goes = goes & (step <= most[i])
-        total = np.where(goes, cost[:, None] + _TURN * step**2 / max(length[i], 1e-3) / 1e3, np.inf)
-        if not np.isfinite(total).any():
-            break
-        came.append(total.argmin(axis=0))
-        cost = total.min(axis=0) + b[:, 1] * max(length[i], 1e-3)
-        i += 1
-    at = int(cost.argmin())
-    chosen = [at]
-    for back in reversed(came):
-        at = int(back[at])
-        chosen.append(at)
-    index = np.array(chosen[::-1])
-    rows = np.array([states[first + k][j] for k, j in enumerate(index)])
-    return (rows[:, 0], rows[:, 2].astype(np.int64)), i + 1
-
-
-def _smooth(
-    ranges: list[Floats], piece: tuple[Floats, Ints], length: Floats, most: Floats, first: int, wanted: float
-) -> Floats:
-    """B without jumps of whole turns, drawn towards the mean of the neighbours, within the ranges and the steps."""
-    B, which = piece
-    out: Floats = B[0] + np.concatenate([[0.0], np.cumsum(_near(np.diff(B)))])
-    own = np.array([ranges[first + k][j] for k, j in enumerate(which)])
-    own = own + (out - B)[:, None]
-    width = own[:, 1] - own[:, 0]
-    inset = np.minimum(np.maximum(_INSET * width, np.minimum(0.5 * wanted, 0.25 * width)), 0.5 * width)
-    # a state of the search is never nearer to an end than this
-    low, high = np.minimum(own[:, 0] + inset, out), np.maximum(own[:, 1] - inset, out)
-    if len(out) < 3:
-        return out
-    a, b = length[first : first + len(out) - 2], length[first + 1 : first + len(out) - 1]
-    share = (a / np.where(a + b > 0.0, a + b, 1.0)).clip(0.0, 1.0)
-    limit = most[first : first + len(out) - 1]
-    for _ in range(_ROUNDS):
-        new = out.copy()
-        new[1:-1] = 0.5 * out[1:-1] + 0.5 * (out[:-2] * (1.0 - share) + out[2:] * share)
-        new = np.clip(new, low, high)
-        if (np.abs(np.diff(new)) > limit).any():
-            break
-        out = new
     return out

@@ -299,7 +299,7 @@ class _Stepper:
     def _scallop(self, line: Line, q: Floats, pallet: Floats) -> Floats:
         """(n,) scallop between a line and one at q, the highest near each station; nan: one of them is not milled."""
         n = len(q)
-        length = float(np.linalg.norm(np.diff(line.S, axis=0), axis=1).mean())
+        length = float(line.size.mean())
         sub = 2 * max(1, math.ceil(0.5 * length / pose_distance(self.lines.cutter.corner_radius)))
         at = np.arange((n - 1) * sub + 1) / sub
         p, q0, q1 = (np.interp(at, np.arange(n), x) for x in (self.lines.p, line.q, q))
@@ -342,7 +342,7 @@ class _Stepper:
     def _distance_across(self, line: Line, q: Floats) -> Floats:
         u, v = self.lines.places(self.lines.p, q)
         Sq = self.lines.sign * self.lines.surface.at(u, v, *((0, 1) if self.lines.along == "u" else (1, 0)))
-        out: Floats = (Sq * np.cross(line.N, line.d)).sum(axis=1)
+        out: Floats = (Sq * line.e).sum(axis=1)
         return out
 
     def _even(self, line: Line, w: Floats) -> Floats:
@@ -351,12 +351,11 @@ class _Stepper:
         if len(known) == 0:
             r, h = self.lines.cutter.corner_radius, self.scallop
             return np.full(len(w), 2.0 * math.sqrt(2.0 * max(r, h) * h))
-        return even_steps(w, np.linalg.norm(np.diff(line.S, axis=0), axis=1))
+        return even_steps(w, line.size)
 
     def _straight(self, line: Line, q: Floats) -> Floats:
         """Places (n,) of the line after ``line``, held back where it would run askew to the parameter lines."""
-        size = np.linalg.norm(np.diff(line.S, axis=0), axis=1)
-        return straighten_line(q, line.q, self._distance_across(line, line.q), size)
+        return straighten_line(q, line.q, self._distance_across(line, line.q), line.size)
 
     def _dq(self, line: Line, w: Floats) -> Floats:
         first = w / np.abs(self._distance_across(line, line.q))

@@ -64,7 +64,7 @@ class Refinement:
     def bad(self, track: ToolTrack) -> Ints:
         """Rows (k to k + 1) that leave the path or touch the part."""
         at = 0.5 * (track.at[1:] + track.at[:-1])
-        S, N = self.surface.at(*at.T), self.surface.normal(*at.T)
+        S, N = self.surface.facing(*at.T)
         B = 0.5 * (track.pallet[1:] + track.pallet[:-1])
         true, _ = pose_cutter(S, N, self.table, B, self.cutter)
         off = np.abs(((true - 0.5 * (track.tip[1:] + track.tip[:-1])) * N).sum(axis=1))
@@ -96,13 +96,12 @@ class Refinement:
 
     def track(self, at: Floats, pallet: Floats, line: int) -> ToolTrack:
         """The track through (u, v) (n, 2) at pallet angles (n,)."""
-        S, N = self.surface.at(*at.T), self.surface.normal(*at.T)
+        S, N = self.surface.facing(*at.T)
         return track_of(at, S, N, self.table, pallet, self.cutter, line)
 
     def pallet(self, at: Floats, wanted: float, window: float = float(_WINDOW)) -> float | None:
         """Valid pallet angle nearest to the wanted one, within the window."""
-        S, N, K = (f(*at) for f in (self.surface.at, self.surface.normal, self.surface.curvature))
-        scene = self.scene.at_contacts(S, N, K, self.number)
+        scene = self.scene.at_contacts(*self.surface.shape(*at)[:3], self.number)
         spans = ((wanted - window, wanted + window),)
         r = valid_ranges(scene, self.cutter, self.table, self.clearance, spans).ranges[0]
         if not len(r):

@@ -232,8 +232,7 @@ class RestSettings:
     def _widths(self, face: SurfaceGrid, some: Ints, pair: Pair) -> Floats:
         """Widest range [rad] of the pallet at each of the points; 0: none."""
         u, v = face.u[some[:, 0]], face.v[some[:, 1]]
-        S, N, K = (f(u, v) for f in (face.surface.at, face.surface.normal, face.surface.curvature))
-        scene = self.scene.at_contacts(S, N, K, face.number)
+        scene = self.scene.at_contacts(*face.surface.shape(u, v)[:3], face.number)
         got = valid_ranges(
             scene, self.catalogue.cutters[pair[0]], pair[1], self.motion.clearance, self.pallets, workers=self.workers
         )

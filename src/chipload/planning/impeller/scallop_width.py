@@ -17,9 +17,12 @@ from __future__ import annotations
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
+from chipload.lazy import LateModule
 from chipload.planning.impeller.profile import support
 from chipload.planning.impeller.scene import Floats
 from chipload.planning.impeller.step_over import contact_of, trace_curvature
+
+_scallop_width = LateModule("chipload.planning.impeller._scallop_width")
 
 _PHI = np.radians(np.concatenate([-np.geomspace(80.0, 0.2, 60), [0.0], np.geomspace(0.2, 80.0, 60)]))
 
@@ -61,16 +64,8 @@ def reaches(
     with np.errstate(divide="ignore", invalid="ignore"):
         bare = np.where(flat > 0.0, 1.0 / np.where(flat > 0.0, flat, 1.0), np.inf) - k
         scale = np.where((bare > 0.0) & np.isfinite(bare) & np.isfinite(q), q / bare, 1.0)
-    out = []
-    for sign in (1.0, -1.0):
-        y = ((sign * x)[None, :, None] * sin[:, None] - H[:, None]) / cos[:, None]
-        g = (y.max(axis=2) - 0.5 * k[:, None] * x**2) * scale[:, None]
-        over = g >= scallop
-        j = np.where(over.any(axis=1), over.argmax(axis=1), len(x) - 1)
-        rows = np.arange(len(N))
-        g0, g1, x0, x1 = g[rows, np.maximum(j - 1, 0)], g[rows, j], x[np.maximum(j - 1, 0)], x[j]
-        # between two places the outline is nearly a parabola
-        root = np.sqrt(np.clip(np.stack([g0, g1, np.full_like(g0, scallop)]), 0.0, None))
-        share = np.where(root[1] > root[0], (root[2] - root[0]) / np.where(root[1] > root[0], root[1] - root[0], 1), 1)
-        out.append(np.where(q > 0.0, np.where(over.any(axis=1), x0 + share * (x1 - x0), R), 0.0))
-    return out[0], out[1]
+    ahead, behind = np.empty(len(N)), np.empty(len(N))
+    outline = sin, cos, H, 0.5 * k, scale, q, scallop, R
+    for sign, out in ((1.0, ahead), (-1.0, behind)):
+        _scallop_width.reach_on_side(sign * x, x**2, *outline, out)
+    return ahead, behind

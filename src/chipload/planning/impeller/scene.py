@@ -13,10 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.planning.impeller.tree import Tree, tree_of
 
 if TYPE_CHECKING:
     from chipload.planning.impeller.covering.covering import Covering
+
+_scene = LateModule("chipload.planning.impeller._scene")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -146,13 +149,9 @@ class Scene:
 
     def _rows(self) -> Floats:
         """(c, 16): S, N, tangents E1, E2, K in them, the surface."""
-        N = self.normal
-        other = np.eye(3)[np.abs(N).argmin(axis=1)]
-        E1 = np.cross(N, other)
-        E1 /= np.linalg.norm(E1, axis=1)[:, None]
-        E2 = np.cross(N, E1)
-        K = [np.einsum("ci,cij,cj->c", a, self.curvature, b) for a, b in ((E1, E1), (E1, E2), (E2, E2))]
-        return np.column_stack([self.contact, N, E1, E2, *K, self.surface])
+        out = np.empty((len(self.contact), 16))
+        _scene.contact_rows(self.contact, self.normal, self.curvature, self.surface, out)
+        return out
 
     @property
     def curvature_max(self) -> Floats:
