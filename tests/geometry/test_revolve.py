@@ -43,3 +43,11 @@ def test_refused():
         Revolved(np.array([[1.0, 0.0], [2.0, 3.0], [2.0, 3.0]]), 1)
     with pytest.raises(InputError, match="on the axis"):
         Revolved(np.array([[0.0, 0.0], [5.0, 0.0]]), 1).curvature([0.0], [0.0])
+
+
+def test_nearest_is_the_nearest_of_all_points_of_the_curve():
+    ball = Revolved(30.0 * np.stack([np.cos(A), np.sin(A)], axis=-1), 1)
+    r, z = np.random.default_rng(4).uniform(0.0, 40.0, (2, 50))
+    s = np.linspace(0.0, 1.0, 101)
+    away = np.hypot(r[:, None] - ball.curve(s)[:, 0], z[:, None] - ball.curve(s)[:, 1])
+    np.testing.assert_array_equal(ball.nearest(r, z, 101), s[away.argmin(axis=1)])

@@ -100,5 +100,6 @@ class Revolved:
         s = np.linspace(0.0, 1.0, count)
         c = self.curve(s)
         given = np.stack(np.broadcast_arrays(np.asarray(r, float), np.asarray(z, float)), axis=-1).reshape(-1, 2)
-        out: Floats = s[((given[:, None, :] - c[None]) ** 2).sum(axis=2).argmin(axis=1)]
+        _, which = scipy.spatial.cKDTree(c).query(given)
+        out: Floats = s[which]
         return out

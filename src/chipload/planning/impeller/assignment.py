@@ -22,7 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.planning.impeller.scene import Floats
+
+_assignment = LateModule("chipload.planning.impeller._assignment")
 
 #: greatest number of sets of cutters
 SETS = 300_000
@@ -270,26 +273,14 @@ def _totals(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64], cha
     """Least times (n,) of many sets, as :func:`_solve_chosen` without the steps; inf: cells are left."""
     state = np.zeros((*sets.shape, sides[0][0].shape[3]))
     for side in sides:
-        options = []
+        after = np.full_like(state, np.inf)
         for cost in side:
-            of_sets = cost[:, :, sets]
-            for forth in (1, -1):
-                after = state
-                for cells in of_sets[::forth]:
-                    whole = cells.sum(axis=0)
-                    through = _enter_states(after, changes) + whole
-                    split = ~np.isfinite(whole).any(axis=(1, 2))
-                    if split.any():
-                        both = []
-                        for direction in (1, -1):
-                            part = after[split]
-                            for cell in cells[::direction, split]:
-                                part = _enter_states(part, changes) + cell
-                            both.append(part)
-                        through[split] = np.minimum(*both)
-                    after = through
-                options.append(after)
-        state = np.minimum.reduce(options)
+            cells = np.ascontiguousarray(cost)
+            for step in (1, -1):
+                _assignment.mill_strips(
+                    cells, cells.sum(axis=1), sets, state, step, changes.cutter, changes.table, after
+                )
+        state = after
     out: Floats = state.min(axis=(1, 2))
     return out
 

@@ -148,9 +148,9 @@ def deepest_gouge(
         at = cells.corners()
         # cells share their corners
         rows = np.column_stack([np.repeat(cells.wall, 4), at.reshape(-1, 2)])
-        once, corner = np.unique(rows, axis=0, return_inverse=True)
-        number, corner = once[:, 0].astype(np.int64), corner.reshape(-1, 4)
-        points, normals = _places_on(walls, number, np.asarray(once[:, 1:], dtype=np.float64))
+        once, inverse = _once(np.asarray(rows, dtype=np.float64))
+        number, corner = once[:, 0].astype(np.int64), inverse.reshape(-1, 4)
+        points, normals = _places_on(walls, number, once[:, 1:])
         t, w = _reach(points[corner], normals[corner])
         grown = _GROWN * float(t.max())
         known = _has_bound(cutter.corner_radius, grown, t, w).any()
@@ -206,6 +206,21 @@ def deepest_gouge(
             break
         cells = cells.divided(open_cells)
     return Gouge(best.found, max(settled, best.found), best.wall, best.place, best.row, best.part)
+
+
+def _once(rows: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """The different rows (m, k) in ascending order, and the one (n,) of each row: faster than :func:`numpy.unique`.
+
+    >>> once, which = _once(np.array([[1.0, 2.0], [0.0, 3.0], [1.0, 2.0]]))
+    >>> once.tolist(), which.tolist()
+    ([[0.0, 3.0], [1.0, 2.0]], [1, 0, 1])
+    """
+    order = np.lexsort(rows.T[::-1])
+    ascending = rows[order]
+    new = np.concatenate([[True], (ascending[1:] != ascending[:-1]).any(axis=1)])
+    which = np.empty(len(rows), dtype=np.int64)
+    which[order] = np.cumsum(new) - 1
+    return ascending[new], which
 
 
 def _has_bound(r: float, grown: float, t: Floats, w: Floats) -> NDArray[np.bool_]:
