@@ -42,7 +42,10 @@ def run_job(name: str, results: Path) -> None:
     source, out = SOURCES[name], results / name
     if (out / "summary.json").exists():
         return
+    for other, _ in source.files.values():
+        run_job(other, results)
     words = [sys.executable, "-m", "chipload", "run", str(EXAMPLES / source.example / source.job), "--out", str(out)]
+    words += [word for value in source.sets(results) for word in ("--set", value)]
     code = subprocess.run(words, check=False, stdout=subprocess.DEVNULL).returncode
     if code not in (0, 3):
         raise SystemExit(f"{name}: chipload run ended with exit code {code}")

@@ -13,7 +13,7 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,9 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), *sorted(EXA
 MARK = re.compile(r"([-+\w.,%]+)<!--(\w+)\.(\w+)-->")
 #: number with its digits grouped, a power of ten, or a word
 Text = dict[str, str]
+#: [mm] of the frame, as tools/frame_step.py writes it, and its cutter
+LENGTH, WIDTH, WALL, CORNER, RADIUS = 40.0, 24.0, 1.5, 5.0, 4.0
+MIDDLE = 0.5 * LENGTH
 
 
 @dataclass(frozen=True)
@@ -257,6 +260,81 @@ def cone(run: Run) -> Text:
     return _controllers(run)
 
 
+def frame(run: Run) -> Text:
+    """The walls of the frame in the elastic part; of each face the form error of its worst step at 95 %."""
+    made, check, stress = run.operation, run.limit("form_error_um"), run.limit("stress_mpa")
+    share = check["budget"]["value"] / check["worst"]
+    return {
+        "verdict": run.summary["verdict"],
+        "form_um": f"{check['worst']:.1f}",
+        "form_95_um": f"{check['budget']['value']:.1f}",
+        "bound_percent": f"{100.0 * check['resolution_error']:.0f}",
+        "cutter_um": f"{made['deflection_um']['cutter_max']:.1f}",
+        "part_um": f"{made['deflection_um']['workpiece_max']:.1f}",
+        "stress_mpa": f"{stress['budget']['value']:.0f}",
+        "gouge_um": f"{1e3 * run.worst('gouge_mm'):.1f}",
+        "excess_um": f"{1e3 * made['excess_mm']['max']:.0f}",
+        "time_s": f"{made['time_s']:.1f}",
+        "states": str(made["states"]),
+        "change_percent": f"{made['state_change_percent']:.0f}",
+        "unknowns": f"{made['unknowns']:,}",
+        **{name: f"{share * worst:.1f}" for name, worst in face_errors(run.folder).items()},
+    }
+
+
+def face_errors(folder: Path) -> dict[str, float]:
+    """Greatest form error [um] of the steps that make each wall of the frame, and of its corners."""
+    import numpy as np
+
+    from chipload.result import load_result
+
+    columns = load_result(folder).tracks[0].columns
+    error = np.abs(np.nan_to_num(np.asarray(columns["form_error_um"], dtype=np.float64)))
+    x, y = (np.asarray(columns[name], dtype=np.float64) for name in ("x_mm", "y_mm"))
+    faces, within = dict[str, float](), np.zeros(len(x), dtype=np.bool_)
+    for side, low, high in (("left", WALL, MIDDLE - 0.5 * WALL), ("right", MIDDLE + 0.5 * WALL, LENGTH - WALL)):
+        own = (x > low) & (x < high)
+        for wall, gap, along, ends in (
+            ("west", x - low, y, (WALL, WIDTH - WALL)), ("east", high - x, y, (WALL, WIDTH - WALL)),
+            ("south", y - WALL, x, (low, high)), ("north", WIDTH - WALL - y, x, (low, high)),
+        ):  # fmt: skip
+            straight = (along > ends[0] + CORNER) & (along < ends[1] - CORNER)
+            here = own & straight & (np.abs(gap - RADIUS) < 0.1)
+            faces[f"{side}_{wall}_95_um"] = float(error[here].max())
+            within |= here
+    return {**faces, "corners_95_um": float(error[~within].max())}
+
+
+def frame_pockets(run: Run) -> Text:
+    """The programs of the frame."""
+    made = run.summary["operations"]
+    times = [one["strategies"]["pocket"] for one in made]
+    return {
+        "rough_s": f"{times[0]['time_s']:.1f}",
+        "finish_s": f"{times[1]['time_s']:.1f}",
+        "engagement_deg": f"{run.worst('engagement_deg'):.1f}",
+        "torque_nm": f"{run.limit('torque_nm')['budget']['value']:.2f}",
+    }
+
+
+def frame_roughing(run: Run) -> Text:
+    """The first program of the frame in its block."""
+    return {"verdict": run.summary["verdict"], "gouge_um": f"{1e3 * run.worst('gouge_mm'):.1f}"}
+
+
+def frame_distortion(run: Run) -> Text:
+    """The frame after its release; the plans by what is left to a second clamping."""
+    plans = {tuple(s["stock_mm"] for s in p["setups"]): p for p in run.operation["plans"] if not p["upside_down"]}
+    check = run.limit("flatness_um")
+    return {
+        "flatness_um": f"{check['worst']:.1f}",
+        "flatness_high_um": f"{check['worst'] * (1.0 + check['resolution_error']):.1f}",
+        "once_um": f"{plans[0.0,]['distortion_um']['value']:.1f}",
+        "released_um": f"{plans[1.0, 0.0]['distortion_um']['value']:.1f}",
+        "cell_percent": f"{100.0 * run.operation['cell_error']:.1f}",
+    }
+
+
 def notebooks(run: Run) -> Text:
     """The program of the notebook."""
     return {"force_n": f"{run.worst('force_n'):.0f}", "deflection_um": f"{run.worst('deflection_um'):.1f}"}
@@ -306,6 +384,7 @@ class Source:
     values : reads the numbers from its result
     pictures : files ``docs/NAME.png`` that show it
     long : takes many minutes: run by ``make real``, and by ``tools/figures.py`` only where it is named
+    files : keys of the job that name a file of another result: the source that makes it, and the file
     """
 
     example: str
@@ -313,6 +392,11 @@ class Source:
     job: str = "job.toml"
     pictures: tuple[str, ...] = ()
     long: bool = False
+    files: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    def sets(self, results: Path) -> list[str]:
+        """The words of the command that name these files where all results stand in one folder."""
+        return [f"{key}={results / source / name}" for key, (source, name) in self.files.items()]
 
 
 SOURCES: Mapping[str, Source] = {
@@ -329,6 +413,21 @@ SOURCES: Mapping[str, Source] = {
     "blade": Source("blade", blade, pictures=("blade",)),
     "tube": Source("tube", tube, pictures=("tube",)),
     "cone": Source("cone", cone, pictures=("cone",)),
+    "frame_pockets": Source("frame", frame_pockets),
+    "frame_roughing": Source(
+        "frame", frame_roughing, "roughing.toml", files={"program.file": ("frame_pockets", "0-pocket.ngc")}
+    ),
+    "frame": Source(
+        "frame",
+        frame,
+        "walls.toml",
+        pictures=("frame",),
+        files={
+            "program.file": ("frame_pockets", "1-pocket.ngc"),
+            "stock.file": ("frame_roughing", "stock.npz"),
+        },
+    ),
+    "frame_distortion": Source("frame", frame_distortion, "distortion.toml"),
     "notebooks": Source("notebooks", notebooks, pictures=("notebooks",)),
     "impeller": Source("impeller", impeller, pictures=("impeller", "page_impeller")),
     "hecc": Source("hecc", hecc, pictures=("hecc",), long=True),

@@ -36,6 +36,7 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "chatter": (("stability", 500, 460), ("margin", 500, 460)),
     "bracket": (("view3d", 560, 640), ("loads", 430, 860)),
     "part": (("bent", 700, 480),),
+    "frame": (("view3d", 860, 620),),
     "tube": (("path", 900, 860),),
     "cone": (("allowable", 900, 380),),
     "plate": (("depth", 940, 520),),

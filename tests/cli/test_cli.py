@@ -167,6 +167,7 @@ def test_examples_are_listed_with_a_line_each() -> None:
         "cone",
         "contour",
         "feeds",
+        "frame",
         "hecc",
         "impeller",
         "notebooks",
@@ -209,8 +210,8 @@ def test_an_unknown_example_names_the_nearest(tmp_path: Path) -> None:
     code, _, err = call("example", "contur", tmp_path / "a")
     assert code == 2
     known = (
-        "blade, bracket, chatter, chips, cone, contour, feeds, hecc, impeller, notebooks, part, plate, pocket, "
-        "trunnion, tube"
+        "blade, bracket, chatter, chips, cone, contour, feeds, frame, hecc, impeller, notebooks, part, plate, "
+        "pocket, trunnion, tube"
     )
     assert err == f"chipload: example contur: not known; did you mean contour? (known: {known})\n"
 

@@ -10,10 +10,11 @@ import pytest
 import trimesh
 
 from chipload import jobs
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.jobs.coarse import coarser
 from chipload.jobs.program.result import result_of
 from chipload.jobs.program.run import check, run
+from chipload.number_text import number_text
 
 #: a wall of 3 mm, 16 mm high and 30 mm long, is made 2.5 mm thin from one side
 PROGRAM = """%
@@ -141,6 +142,16 @@ def test_a_step_that_meets_the_wall_at_its_end_bends_it_where_it_cuts(job_file):
         found.append((gives[square[-1]], gives[along[0]]))
         assert found[-1][0] == pytest.approx(found[-1][1], rel=0.5)
     assert found[0][0] == pytest.approx(found[1][0], rel=0.1)
+
+
+def test_fewer_states_than_passes_are_named(job_file):
+    """Two states where the first ones alone are four: how many there should be, and what the deflection may exceed."""
+    done = run(loaded(changed(job_file, "states = 4", "states = 2")))
+    note = next(f for f in result_of(done).tracks[0].findings if f.code == "few-states")
+    assert note.severity is Severity.NOTE
+    change = done.simulated.workpiece.state_change
+    assert note.text.startswith("workpiece.states = 2: a state before each pass over a place takes 4; ")
+    assert note.text.endswith(f"may be {number_text(100.0 * change, 2)} % greater")
 
 
 def test_a_wall_gives_way_as_a_plate(job_file):

@@ -61,7 +61,7 @@ class Example:
     @property
     def loaded(self) -> LoadedJob:
         """Its job."""
-        return load_job(_job_file(self.name), SHORTER.get(self.name, ()))
+        return load_job(_job_file(self.name), _sets(self.name, self.folder.parent))
 
     @property
     def limits(self) -> dict[str, Any]:
@@ -88,6 +88,8 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Example
 
     @cache
     def of(name: str) -> Example:
+        for other, _ in SOURCES[name].files.values():
+            of(other)
         with (top / f"{name}.lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             ended = top / f"{name}.json"
@@ -103,6 +105,11 @@ def _job_file(name: str) -> Path:
     """The job file of an example."""
     source = SOURCES[name]
     return EXAMPLES / source.example / source.job
+
+
+def _sets(name: str, results: Path) -> tuple[str, ...]:
+    """What is changed in the job of an example."""
+    return (*SHORTER.get(name, ()), *SOURCES[name].sets(results))
 
 
 def _run(name: str, out: Path) -> dict[str, Any]:
@@ -121,7 +128,7 @@ def _run(name: str, out: Path) -> dict[str, Any]:
 
     # nothing is kept on the way: what was made is compared when that has gone
     words = ["run", str(_job_file(name)), "--out", str(out), "--keep-s", "86400"]
-    words += [word for value in SHORTER.get(name, ()) for word in ("--set", value)]
+    words += [word for value in _sets(name, out.parent) for word in ("--set", value)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(folder_module, "write_result", kept)
         patch.setattr(removal_module, "removal_mesh", wide)

@@ -29,6 +29,7 @@ NAMES = (
     "chatter",
     "bracket",
     "part",
+    "frame",
     "trunnion",
     "tube",
     "cone",
@@ -86,7 +87,7 @@ def test_one_state_everywhere(example, name):
 
 
 #: examples whose tracks were simulated in a stock
-SIMULATED = ("chips", "feeds", "chatter", "bracket", "part", "tube", "cone", "plate", "blade")
+SIMULATED = ("chips", "feeds", "chatter", "bracket", "part", "frame", "tube", "cone", "plate", "blade")
 #: greatest size of the balance; along the steps of the twisted blade the axis turns: -0.045 to -0.050
 BALANCE = {"blade": 0.06}
 
@@ -228,7 +229,8 @@ def test_one_clock(example, name):
             tools = tool_lengths(done) if name in WITH_LENGTHS else None
             read = read_program(done.folder / track.programs[0], machine, tools=tools)
             # the digits of a text decide at which joints of five axes the machine slows down: 0.14 % of a program
-            close = 2e-3 if name == "impeller" else CLOSE
+            # the APT of a program that begins with a motion in X and Y begins at z = 0: 0.17 % of 54 s
+            close = 2e-3 if name in ("impeller", "frame") else CLOSE
             assert line_times(read, machine)[1].sum() == pytest.approx(track.time_s, rel=close), track.name
             if track.in_use:
                 assert 60.0 * minutes_of(done, track.programs[0]) == pytest.approx(track.time_s, rel=close)

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 
 import pytest
+from page_values import SOURCES
 
 from chipload.number_text import number_text
 from chipload.result import Result, load_result
@@ -43,6 +44,7 @@ def test_the_page_states_what_the_summary_states(example, browser, served, name)
     # it opens with the program of the critical limit
     first = next((k for k, t in enumerate(tracks) if t["name"] == _critical_track(result)), 0)
     tracks = tracks[first:] + tracks[:first]
+    made = [file for _, file in SOURCES[name].files.values()]
     checks = {(t.name, c.name): c for t in result.tracks for c in t.limits}
     page = browser.new_page(viewport={"width": 1280, "height": 720})
     try:
@@ -81,7 +83,7 @@ def test_the_page_states_what_the_summary_states(example, browser, served, name)
             if track["programs"]:
                 page.wait_for_function(
                     "names => names.some(n => document.querySelector('.cl-file').textContent.startsWith(n))",
-                    arg=[*track["programs"], *(p.name for p in (done.loaded.job.path.parent).iterdir())],
+                    arg=[*track["programs"], *made, *(p.name for p in (done.loaded.job.path.parent).iterdir())],
                 )
                 assert page.locator(".cl-line").count() > 1
     finally:

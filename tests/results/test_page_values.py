@@ -19,15 +19,16 @@ RENEW = "run make figures, and look at what it changes"
 VERDICTS = {
     "contour": "holds", "pocket": "holds", "trunnion": "unproven", "chips": "holds", "chips_blade": "holds",
     "chatter": "holds", "bracket": "exceeds", "feeds": "holds", "part": "holds", "plate": "holds", "blade": "holds",
-    "tube": "holds", "cone": "holds", "notebooks": "holds", "impeller": "holds", "hecc": "exceeds",
+    "tube": "holds", "cone": "holds", "frame_pockets": "holds", "frame_roughing": "holds", "frame": "holds",
+    "frame_distortion": "holds", "notebooks": "holds", "impeller": "holds", "hecc": "exceeds",
 }  # fmt: skip
 NAMES = [name for name, source in SOURCES.items() if not source.long]
 
 
-#: numbers of the gallery that neither a result nor a job states: exit codes, a swing of the geometry, cutters and table
-#: angles
+#: numbers of the gallery that neither a result nor a job states: exit codes, a swing of the geometry, cutters table
+#: angles, the confidence
 STATED = {
-    "trunnion": {3.0}, "chips": {44.0}, "impeller": {14.0, 1.5, 15.0}, "hecc": {3.0},
+    "trunnion": {3.0}, "chips": {44.0}, "impeller": {14.0, 1.5, 15.0}, "hecc": {3.0}, "frame": {95.0},
 }  # fmt: skip
 
 

@@ -91,7 +91,7 @@ class WorkpieceCompliance:
     unknowns : of the state with most
     error : relative error of the greatest deflection, by cells and states
     state_change : relative amount by which the greatest deflection may exceed the calculated one between two states
-    findings : material that is not connected to a clamp
+    findings : material that is not connected to a clamp; fewer states than passes
     bent : the workpiece in its worst step; None: nothing is cut
     modes : of vibration, followed through the removal; None: the density is not stated
     strained : stress of the steps that bend it most and of those with most force; None: no yield stress is stated
@@ -203,6 +203,13 @@ def workpiece_compliance(
     if found.loose > 1e-6 * stock.volume():
         text = f"{number_text(found.loose, 3)} mm3 of the workpiece are connected to nothing and carry no force"
         findings = (Finding("loose-material", 0, text, Severity.UNPROVEN),)
+    most = max(workpiece.states, 2)
+    if found.wanted > most and change > share:
+        text = (
+            f"workpiece.states = {most}: a state before each pass over a place takes {found.wanted}; between the "
+            f"states that are solved the deflection of the workpiece may be {number_text(100.0 * change, 2)} % greater"
+        )
+        findings = (*findings, Finding("few-states", 0, text, Severity.NOTE))
     return WorkpieceCompliance(
         found,
         wall,

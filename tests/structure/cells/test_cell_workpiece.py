@@ -275,6 +275,10 @@ def test_steps_before_a_later_pass_are_not_taken_for_what_it_leaves():
     steps = StepLines(np.arange(12), np.array(lines), np.full(12, 100.0), np.arange(12) * 900.0)
     found = step_compliances(steps, states, tolerance=10.0, most=5, spacing=5.0)
     assert {0, 6, 12} <= set(found.states)
+    # before all, after a third and two thirds of the volume, between the passes, after all
+    assert found.wanted == 5
+    few = step_compliances(steps, states, tolerance=10.0, most=4, spacing=5.0)
+    assert (few.wanted, 6 in few.states) == (5, False)
     alone = np.array([size_of(line_compliances(states[k].build(), steps.lines[k : k + 1]))[0] for k in range(12)])
     after = np.array([size_of(line_compliances(states[k + 1].build(), steps.lines[k : k + 1]))[0] for k in range(12)])
     size = size_of(found.compliance)

@@ -85,6 +85,8 @@ class StepCompliances:
     after_compliance : (w, s, 3, 3) float [mm/N] in that state
     states : steps before which a state was solved
     loose : [mm^3] greatest volume without a connection to a clamp
+    wanted : number of states of which one lies before each pass over a place; if more than are allowed, none was chosen
+        for that
     """
 
     step: Indices
@@ -96,6 +98,7 @@ class StepCompliances:
     after_compliance: Array
     states: tuple[int, ...]
     loose: float
+    wanted: int = 0
 
     def at(self, steps: Indices) -> Array:
         """Compliance of steps (n, s, 3, 3); a step that is not known takes that of the last known one before it."""
@@ -141,7 +144,8 @@ def step_compliances(
     built : called with each state that is solved, by its number, each time that it is built
     """
     solver = _Solver(steps, states, spaced_rows(steps.lines, spacing, LINES), built)
-    chosen, spans = _choose_states(solver, tolerance, most, 4.0 * spacing, progress)
+    wanted = sorted({*_first_states(states), *states_between_passes(steps, solver.samples, states, 4.0 * spacing)})
+    chosen, spans = _choose_states(solver, wanted, tolerance, most, progress)
     out, doubt = np.zeros((len(steps.step), len(STATIONS), 3, 3)), np.zeros(len(steps.step))
     for a, b in spans:
         own, rows = solver.rows(a, b), solver.sampled(a, b)
@@ -173,7 +177,7 @@ def step_compliances(
     worst = worst[np.argsort(-size_of(out[worst]) * steps.force[worst], kind="stable")][:WORST]
     return StepCompliances(
         steps.step, steps.lines, out, doubt, worst, tight[worst], later[worst],
-        tuple(states[k].step for k in chosen), solver.loose,
+        tuple(states[k].step for k in chosen), solver.loose, len(wanted),
     )  # fmt: skip
 
 
@@ -232,13 +236,11 @@ class _Solver:
 
 
 def _choose_states(
-    solver: _Solver, tolerance: float, most: int, near: float, progress: Progress
+    solver: _Solver, wanted: list[int], tolerance: float, most: int, progress: Progress
 ) -> tuple[list[int], list[tuple[int, int]]]:
     """States that differ by at most ``tolerance`` of the greatest deflection or are ``most``, and their intervals."""
     states = solver.states
-    between = states_between_passes(solver.steps, solver.samples, states, near)
-    chosen = _first_states(states)
-    chosen = sorted({*chosen, *between}) if len({*chosen, *between}) <= most else chosen
+    chosen = wanted if len(wanted) <= most else _first_states(states)
     for n, k in enumerate(chosen):
         progress(n / most, "states of the workpiece")
         # the steps on both sides at once, so that no state is built twice
