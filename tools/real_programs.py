@@ -207,9 +207,10 @@ def finished(text: str) -> bool:
 
 def write(new: dict[str, str]) -> None:
     """The page with new rows."""
-    rows = (rows_of(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}) | new
+    page = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
+    rows, other = rows_of(page) | new, page[page.find("\n## ") :] if "\n## " in page else ""
     lines = [rows.get(name, row(name, kind, NOT_RUN, "", None)) for name, kind in FILES.items()]
-    PAGE.write_text(HEAD.format(not_run=NOT_RUN) + "\n".join(lines) + "\n", encoding="utf-8")
+    PAGE.write_text(HEAD.format(not_run=NOT_RUN) + "\n".join(lines) + "\n" + other, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -60,7 +60,9 @@ def test_rows_of_other_files_stay(tool, tmp_path, monkeypatch):
     monkeypatch.setattr(tool, "PAGE", tmp_path / "page.md")
     a, b, *rest = tool.FILES
     tool.write({a: tool.row(a, "k", "exceeds", "x | y", 12.3)})
+    tool.PAGE.write_text(tool.PAGE.read_text() + "\n## More\n\nA text.\n")
     tool.write({b: tool.row(b, "k", "unproven", "z", 4.0)})
+    assert tool.PAGE.read_text().endswith("|\n\n## More\n\nA text.\n")
     rows = tool.rows_of(tool.PAGE.read_text())
     assert rows[a] == f"| `{a}` | k | exceeds | x / y | 12 |"
     assert rows[b].endswith("| unproven | z | 4 |")
