@@ -1,11 +1,14 @@
 """The page in a real browser: every panel stands at the row that the hand-made history says."""
 
 import re
+import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from square import FEED, FORCE, LINE, ROWS, T, X, Y
+from chipload.result import Track, TrackKind, in_memory
+from square import FEED, FORCE, LINE, ROWS, T, X, Y, square_result, write_by_hand
 from web_lists import VIEW, choose, click_until, drawn, play_slowly, serious_problems, settle, stop
 
 BACKGROUND = (238, 241, 245)
@@ -273,3 +276,34 @@ def test_a_print_of_a_dark_page_is_light_with_whole_plots(square, pixels) -> Non
     assert page.locator(".cl-stage canvas").count() == 1
     page.keyboard.press("d")
     page.wait_for_function(f"{ground} == '{light}'")
+
+
+def test_a_zoom_shows_rows_that_the_whole_plot_leaves_out(window, folder) -> None:
+    n, path = 6000, folder / "long"
+    t = 0.01 * np.arange(n)
+    table = {"t_s": t, "s_mm": t, "x_mm": t, "y_mm": np.sin(t), "z_mm": np.zeros(n), "force_n": 100.0 + np.sin(t)}
+    track = Track("program", TrackKind.PROGRAM, True, float(t[-1]), blocks=in_memory(table))
+    write_by_hand(replace(square_result(), tracks=(track,)), path)
+    # points drawn in the tenth of the time from 24 to 30 s, of which 600 are rows
+    inside = "document.querySelector('.cl-figure').data[0].x.filter((x) => x >= 24 && x <= 30).length"
+    try:
+        page = window("?show=long")
+        page.wait_for_function("document.querySelectorAll('.cl-figure .trace').length > 0")
+        assert page.evaluate(inside) < 150
+        plot = page.locator(".cl-figure .nsewdrag").first
+        box = plot.bounding_box()
+        assert box is not None
+        y = box["y"] + 0.5 * box["height"]
+        page.mouse.move(box["x"] + 0.38 * box["width"], y)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 0.45 * box["width"], y, steps=4)
+        page.mouse.move(box["x"] + 0.52 * box["width"], y, steps=4)
+        page.mouse.up()
+        page.wait_for_function(f"{inside} >= 600")
+        # the part stays in sight when its points have come, and two clicks draw the whole again
+        low, high = page.evaluate("document.querySelector('.cl-figure').layout.xaxis.range")
+        assert 20.0 < low < 24.0 < 30.0 < high < 34.0
+        page.mouse.dblclick(box["x"] + 0.5 * box["width"], y)
+        page.wait_for_function(f"{inside} < 150")
+    finally:
+        shutil.rmtree(path)

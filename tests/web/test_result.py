@@ -329,6 +329,11 @@ def test_a_million_rows_keep_their_extremes(tmp_path: Path) -> None:
     assert (np.nanmax(drawn["y"]), np.nanmin(drawn["y"])) == (5000.0, -70.0)
     assert drawn["x"][int(np.nanargmax(drawn["y"]))] == t[123_456]
     assert np.isnan(drawn["y"]).any()
+    # a part that is zoomed into is drawn row by row where it has few, and the whole stays
+    near = plots.plots(r, track, {"force_n": None}, "time", 0, (), (2000.0, 2005.0))["data"][0]
+    assert set(t[200_000:200_501]) <= set(near["x"])
+    assert set(drawn["x"]) <= set(near["x"])
+    assert len(near["x"]) < len(drawn["x"]) + 1.1 * plots.POINTS
     rows = drawn_rows(scene.view_path(r, track), values)
     assert len(rows) < 1.2 * POINTS
     assert {0, n - 1, 123_456, 777_777} <= set(rows.tolist())

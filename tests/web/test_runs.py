@@ -248,7 +248,8 @@ def test_the_first_look_of_a_draft_comes_before_its_result(tmp_path) -> None:
     assert end["code"] == 3
     places = [k for k, line in enumerate(written) if "first" in line]
     assert len(places) == 1
-    assert written[places[0]]["first"].startswith("Unproven: ")
+    # a limit with its margin and its line, as in the bar of a result
+    assert re.fullmatch(r"Unproven: .* of .*, margin .* %, in line 6 at \(.*\)", written[places[0]]["first"])
     assert all(line["done"] <= worker.FIRST for line in written[: places[0]])
     assert all(line["done"] >= worker.FIRST for line in written[places[0] + 1 :])
     # without the word for a draft its guesses are refused, as by the command

@@ -18,8 +18,9 @@ from chipload.web.result import PageResult, PageTrack, TextColumn
 
 Floats = NDArray[np.float64]
 
-#: points of one line at most, about
-POINTS = 4000
+#: points of one line at most, about, over all rows and again over those that are zoomed into: a plot is 700 pixels
+#: wide, and the browser spends more on its lines than on the 3D view (benchmarks/page.py --pictures)
+POINTS = 1000
 COLOURS = ("#3457a6", "#0b7a75", "#c9821a", "#8a4fa3")
 CURSOR = "#b3261e"
 #: columns that are drawn with another one, in its axis: what is allowed, planned and measured of it, with its dash
@@ -30,6 +31,8 @@ BESIDE = {
 }
 #: a limit farther above the values than this is named but would flatten them if it were drawn
 FAR = 1.8
+#: room for the words of a plot above its greatest value, of the height of its values
+HEAD = 0.42
 #: an axis of values
 VALUES: dict[str, Any] = {
     "gridcolor": GRID,
@@ -52,10 +55,12 @@ def plots(
     against: str,
     row: int,
     sides: Sequence[Side] = (),
+    zoomed: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
     """The figure (plotly, plain values) of columns and their limits with the cursor at a row.
 
-    ``sides``: the track itself and those that it is compared with, each drawn in its colour along the first.
+    ``sides``: the track itself and those that it is compared with, each drawn in its colour along the first;
+    ``zoomed``: part of the abscissa that is drawn in more detail, None: none.
     """
     x = abscissa(track, against)
     others = [(side, rows_along(sides[0], side, against)) for side in sides[1:]]
@@ -70,7 +75,7 @@ def plots(
     for k, (column, bound) in enumerate(bounds.items()):
         values = result.column(track, column)
         y = values.codes.astype(np.float64) if isinstance(values, TextColumn) else values
-        rows = drawn_rows(y)
+        rows = drawn_rows(y, x, zoomed)
         unit = escape(label_and_unit(column)[1])
         colour = sides[0].colour if sides else COLOURS[k % len(COLOURS)]
         axis = "" if k == 0 else str(k + 1)
@@ -84,7 +89,7 @@ def plots(
             # an allowable value far above would flatten what it is compared with
             if float(np.nanmin(own)) <= FAR * float(np.nanmax(np.nan_to_num(y))):
                 drawn.append(np.minimum(own, FAR * float(np.nanmax(np.nan_to_num(y)))))
-            some = drawn_rows(own)
+            some = drawn_rows(own, x, zoomed)
             data.append(_line(name, x[some], own[some], axis, paint, f"%{{y:.5g}} {unit} {name}", dash))
         finite = np.concatenate([v[np.isfinite(v)] for v in drawn])
         low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
@@ -94,7 +99,7 @@ def plots(
         span = (reach - min(low, 0.0)) or 1.0
         axes[f"yaxis{axis}"] = {
             "domain": [max(top - height, 0.0), top],
-            "range": [min(low, 0.0) - 0.04 * span, reach + 0.26 * span],
+            "range": [min(low, 0.0) - 0.04 * span, reach + HEAD * span],
             **VALUES,
             **(_words(values) if isinstance(values, TextColumn) else {}),
         }
@@ -108,7 +113,7 @@ def plots(
         )  # fmt: skip
         for side, xs, v in other_columns:
             if v is not None:
-                some = drawn_rows(v)
+                some = drawn_rows(v, xs, zoomed)
                 template = f"%{{y:.5g}} {unit} {escape(side.title)}"
                 data.append(_line(f"{column}: {side.title}", xs[some], v[some], axis, side.colour, template))
         notes.append(
@@ -225,15 +230,22 @@ def cursor(at: float) -> dict[str, Any]:
     return {"type": "line", "xref": "x", "x0": at, "x1": at, "yref": "paper", "y0": 0, "y1": 1, "line": line}
 
 
-def drawn_rows(values: Floats) -> NDArray[np.int64]:
-    """(m,) rows of a line: each bucket's least and greatest; of a run of rows without a value only the first.
+def drawn_rows(values: Floats, x: Floats, zoomed: tuple[float, float] | None = None) -> NDArray[np.int64]:
+    """(m,) rows of a line over a rising ``x``: each bucket's least and greatest; a zoomed part has its own buckets.
 
-    >>> drawn_rows(np.array([1.0, np.nan, np.nan, 2.0])).tolist()
+    Of a run of rows without a value only the first is drawn.
+
+    >>> drawn_rows(np.array([1.0, np.nan, np.nan, 2.0]), np.arange(4.0)).tolist()
     [0, 1, 3]
     """
     void = np.isnan(values)
     some = np.flatnonzero(~(void & np.concatenate([[False], void[:-1]])))
-    return some[thin_rows(values[some], POINTS)]
+    out = some[thin_rows(values[some], POINTS)]
+    if zoomed is None:
+        return out
+    first, last = np.searchsorted(x[some], zoomed)
+    within = some[max(int(first) - 1, 0) : int(last) + 1]
+    return np.union1d(out, within[thin_rows(values[within], POINTS)]) if len(within) else out
 
 
 def _words(values: TextColumn) -> dict[str, Any]:

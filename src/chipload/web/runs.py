@@ -1,8 +1,8 @@
 """A job in a separate process: reports progress, can be stopped, and ends with the page.
 
 Notation: the process writes a JSON value a line: ``{"done": 0..1, "what": text}`` while it works and at its end
-``{"code": exit code of `chipload run`, "message": text}``; of a draft before that ``{"first": text}``, the first line
-of a coarse run. It stops when its input closes, so that no run outlives the page.
+``{"code": exit code of `chipload run`, "message": text}``; of a draft before that ``{"first": text}``, what a coarse
+run found. It stops when its input closes, so that no run outlives the page.
 """
 
 from __future__ import annotations

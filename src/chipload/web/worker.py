@@ -72,15 +72,21 @@ def work(job: str, out: str, *words: str) -> dict[str, Any]:
 
 
 def first_line(job: str, overrides: Sequence[str], report: Progress) -> str:
-    """The first line of the verdict of a coarse run of a draft; empty: it cannot be coarser."""
+    """What exceeds in a coarse run of a draft, else its critical limit; empty: it cannot be coarser."""
     from chipload.jobs import load_job, run_job
     from chipload.jobs.coarse import coarser, mark_coarse
+    from chipload.result import Verdict
 
     try:
         coarse = load_job(job, (*overrides, *coarser(load_job(job, overrides))))
     except InputError:
         return ""
-    return mark_coarse(run_job(coarse, report, accept=True)).result.first_lines[0]
+    result = mark_coarse(run_job(coarse, report, accept=True)).result
+    critical = result.critical
+    if result.verdict is Verdict.EXCEEDS or critical is None:
+        return result.first_lines[0]
+    said = (critical.value_text, critical.margin_text, critical.where)
+    return f"{result.verdict.value.capitalize()}: {', '.join(filter(None, said))}"
 
 
 def _fault(err: Exception) -> str:

@@ -55,7 +55,8 @@ def limit_table(track: PageTrack) -> str:
         row, unit = row_of(track, c), escape(c.column.unit)
         go = f' data-row="{row}" class="cl-go" title="go there"' if row is not None else ""
         worst = "not known" if c.worst is None else number_text(c.worst)
-        name = c.column.label if c.coverage.whole else f"{c.column.label}, {c.coverage.name}"
+        covers = "" if c.coverage.whole else f"<small>, {escape(c.coverage.name)}</small>"
+        name = escape(c.column.label) + covers
         share = min(100.0 * c.worst / c.limit, 100.0) if c.worst is not None and c.limit > 0.0 else 0.0
         least = "\u2265 " if c.column.least else ""
         if c.column.least and c.worst:
@@ -63,7 +64,7 @@ def limit_table(track: PageTrack) -> str:
         where, state = escape(c.reason or c.where), CLASSES[c.state]
         bar = f'<div class="cl-share"><div class="cl-{state}-bar" style="width:{share:.0f}%"></div></div>'
         out.append(
-            f"<tr{go}><td>{escape(name)}</td><td class=n>{worst}</td>"
+            f"<tr{go}><td>{name}</td><td class=n>{worst}</td>"
             f"<td class=n>{least}{number_text(c.limit, 6)} {unit}</td>"
             f"<td>{bar}</td><td class=cl-{state}>{c.state.value}</td>"
             f'<td class=w title="{where}"><div>{where}</div></td></tr>'

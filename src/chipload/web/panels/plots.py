@@ -12,11 +12,15 @@ from chipload.report.colouring import FIRST
 from chipload.web.checks import Bound, label_and_unit
 from chipload.web.comparison import Side
 from chipload.web.panels import RELEASE
-from chipload.web.plots import abscissa, annotation, bounds_of, plots
+from chipload.web.plots import POINTS, abscissa, annotation, bounds_of, plots
 from chipload.web.result import PageResult, PageTrack, TextColumn
 
 #: a click on a plot gives the abscissa of the nearest point
 CLICK = "(e) => { if (e.points && e.points.length) emit(e.points[0].x) }"
+#: a zoom gives the ends of its part of the abscissa, its undoing none; what the page itself changes is no zoom
+ZOOM = """(e) => { if (!e || !Object.keys(e).some((k) => k.startsWith('xaxis.'))) return;
+    const [a, b] = e['xaxis.range'] ?? [e['xaxis.range[0]'], e['xaxis.range[1]']];
+    emit([Number(a), Number(b)].every(Number.isFinite) ? [Number(a), Number(b)] : []); }"""
 #: columns that are drawn at a time, and at first
 MOST, AT_FIRST = 4, 2
 
@@ -31,6 +35,7 @@ class PlotPanel:
         self.row, self.drawn = 0, -1
         self.bounds: dict[str, Bound | None] = {}
         self.sides: tuple[Side, ...] = ()
+        self.zoomed: tuple[float, float] | None = None
         with ui.element("div").classes("cl-panel cl-plots").props('role=region aria-label="plots"'):
             with ui.element("div").classes("cl-head"):
                 self.columns = ui.select({}, multiple=True, on_change=self._change_columns).props(
@@ -42,6 +47,7 @@ class PlotPanel:
                 ).props("dense no-caps size=sm unelevated toggle-color=blue-grey-7")
             self.figure = ui.plotly({"data": [], "layout": {}, "config": {}}).classes("cl-figure")
             self.figure.on("plotly_click", self._on_click, js_handler=CLICK)
+            self.figure.on("plotly_relayout", self._on_zoom, js_handler=ZOOM)
 
     def compare(self, sides: tuple[Side, ...]) -> None:
         """Draw other tracks over the own one, the first of ``sides``; empty: it alone."""
@@ -51,7 +57,7 @@ class PlotPanel:
     def open(self, result: PageResult, track: PageTrack, row: int = 0) -> None:
         """Show a track, the cursor at a row."""
         same = self.result is result
-        self.sides = ()
+        self.sides, self.zoomed = (), None
         self.result, self.track, self.row = result, track, row
         if not same:
             options = {c: _column_label(c) for c in result.columns}
@@ -80,7 +86,7 @@ class PlotPanel:
     def _draw(self) -> None:
         if self.result is not None and self.track is not None:
             self.bounds = bounds_of(self.result, self.track, self._chosen_columns())
-            figure = plots(self.result, self.track, self.bounds, self.against.value, self.row, self.sides)
+            figure = plots(self.result, self.track, self.bounds, self.against.value, self.row, self.sides, self.zoomed)
             self.figure.update_figure(figure)
             self.drawn = self.row
 
@@ -88,8 +94,19 @@ class PlotPanel:
         self._draw()
 
     def _change_abscissa(self) -> None:
+        self.zoomed = None
         self._draw()
         self.turned()
+
+    def _on_zoom(self, event: Any) -> None:
+        """Draw the part that is zoomed into with as many points as the whole had."""
+        ends = [float(x) for x in event.args] if isinstance(event.args, list) else []
+        zoomed = (min(ends), max(ends)) if len(ends) == 2 else None
+        if self.track is None or self.result is None or zoomed == self.zoomed:
+            return
+        self.zoomed = zoomed
+        if len(self.track) > POINTS:
+            self._draw()
 
     def _on_click(self, event: Any) -> None:
         if self.track is not None and isinstance(event.args, (int, float)):

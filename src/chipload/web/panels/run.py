@@ -83,20 +83,21 @@ class RunPanel:
         self.ask.clear()
         with self.ask:
             questions = Questions(dropped)
-            ui.label("Folder of the job, in the opened folder:").classes("cl-note")
-            where = ui.input(value=dropped.folder).props('dense outlined aria-label="folder of the job"')
-            where.classes("cl-out").mark("out")
-            message = ui.label("").classes("cl-no")
+            with ui.element("div").classes("cl-asked"):
+                ui.label("Folder of the job, in the opened folder:").classes("cl-note")
+                where = ui.input(value=dropped.folder).props('dense outlined aria-label="folder of the job"')
+                where.classes("cl-out").mark("out")
+                message = ui.label("").classes("cl-no")
 
-            async def write(run: bool) -> None:
-                await self._write_job(dropped, questions, str(where.value).strip(), message, run)
+                async def write(run: bool) -> None:
+                    await self._write_job(dropped, questions, str(where.value).strip(), message, run)
 
-            with ui.element("div").classes("cl-entry"):
-                _button("Run", lambda: write(True), "play_arrow").props("unelevated color=primary").props(
-                    remove="flat"
-                ).mark("start")
-                _button("Save the job only", lambda: write(False)).mark("save-job")
-                _button("Cancel", self.dialog.close)
+                with ui.element("div").classes("cl-entry"):
+                    _button("Run", lambda: write(True), "play_arrow").props("unelevated color=primary").props(
+                        remove="flat"
+                    ).mark("start")
+                    _button("Save the job only", lambda: write(False)).mark("save-job")
+                    _button("Cancel", self.dialog.close)
         self.dialog.open()
 
     async def _write_job(
