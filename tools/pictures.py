@@ -42,7 +42,7 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "plate": (("depth", 940, 520),),
     "blade": (("space", 940, 560),),
     "notebooks": (("loads", 960, 900),),
-    "impeller": (("space-0", 920, 580),),
+    "impeller": (("view3d", 920, 660),),
     "hecc": (("space-0", 920, 580),),
 }
 #: the 3D view of the page, and that it and the plots are drawn

@@ -14,6 +14,7 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
@@ -249,12 +250,10 @@ def _removal(removal: RemovalMesh, out: Buffers, cells: float) -> dict[str, Any]
     size = removal.high - removal.low
     step = np.maximum(np.round(cells * removal.cell * STEPS / np.where(size > 0.0, size, 1.0)), 1.0)
     corners = np.round(removal.corners.reshape(-1, 3) / step).astype(np.int64)
-    _, first, at = np.unique(corners @ [1, 1 << 16, 1 << 32], return_index=True, return_inverse=True)
-    # in the order in which the quads come to them
-    order = np.argsort(first)
-    number = np.empty_like(order)
-    number[order] = np.arange(len(order))
-    vertices, quads = corners[first[order]], number[at.ravel()].reshape(-1, 4)
+    # vertices are numbered in the order in which the quads come to them
+    coded = pa.array(corners @ [1, 1 << 16, 1 << 32]).dictionary_encode()
+    keys, quads = coded.dictionary.to_numpy(), coded.indices.to_numpy().astype(np.int64).reshape(-1, 4)
+    vertices = np.stack([keys & 0xFFFF, keys >> 16 & 0xFFFF, keys >> 32], axis=1)
     return {
         "low": removal.low.tolist(),
         "high": removal.high.tolist(),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,8 +22,14 @@ def thin_rows(values: Floats, most: int) -> Ints:
         return np.arange(n)
     buckets = max(1, most // 2)
     edges = np.linspace(0, n, buckets + 1).astype(np.int64)
-    low, high = np.where(np.isnan(values), np.inf, values), np.where(np.isnan(values), -np.inf, values)
-    keep = [np.array([0, n - 1]), np.flatnonzero(np.isnan(values))]
-    for a, b in itertools.pairwise(edges.tolist()):
-        keep.append(np.array([a + low[a:b].argmin(), a + high[a:b].argmax()]))
-    return np.unique(np.concatenate(keep))
+    void = np.isnan(values)
+    low, high = np.where(void, np.inf, values), np.where(void, -np.inf, values)
+    ends = _first_of(low, np.minimum, edges), _first_of(high, np.maximum, edges)
+    return np.unique(np.concatenate([[0, n - 1], np.flatnonzero(void), *ends]))
+
+
+def _first_of(values: Floats, extreme: np.ufunc, edges: Ints) -> Ints:
+    """(b,) row of the extreme of each bucket between two edges, the first where several are."""
+    most = np.repeat(extreme.reduceat(values, edges[:-1]), np.diff(edges))
+    rows = np.flatnonzero(values == most)
+    return rows[np.searchsorted(rows, edges[:-1])]
