@@ -43,7 +43,7 @@ def shape_figure(one: SurfaceMap) -> go.Figure:
     low, high = _range(one.values)
     most = max(-low, high) or 1.0
     signed = low < 0.0 or one.displacement is not None
-    look = {
+    options = {
         "intensity": np.asarray(one.values, dtype=np.float32),
         "colorscale": SIGNED if signed else SCALE,
         "cmin": -most if signed else low,
@@ -52,12 +52,12 @@ def shape_figure(one: SurfaceMap) -> go.Figure:
         "hovertemplate": f"%{{intensity:.3g}} {column.unit}<extra></extra>",
     }
     if one.displacement is None:
-        shown = [(one.points, one.name, look)]
+        shown = [(one.points, one.name, options)]
     else:
         times = magnification(one.points, one.displacement)
         shown = [
             (one.points, "as designed", {"color": DESIGNED, "opacity": 0.18, "hoverinfo": "skip"}),
-            (one.points + times * one.displacement, f"{one.name}, displacement x {times:g}", look),
+            (one.points + times * one.displacement, f"{one.name}, displacement x {times:g}", options),
         ]
     i, j, k = one.faces.astype(np.int32).T
     light = {"ambient": 0.75, "diffuse": 0.5, "specular": 0.05, "roughness": 1.0}

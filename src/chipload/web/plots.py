@@ -244,8 +244,8 @@ def drawn_rows(values: Floats, x: Floats, zoomed: tuple[float, float] | None = N
     if zoomed is None:
         return out
     first, last = np.searchsorted(x[some], zoomed)
-    within = some[max(int(first) - 1, 0) : int(last) + 1]
-    return np.union1d(out, within[thin_rows(values[within], POINTS)]) if len(within) else out
+    part = some[max(int(first) - 1, 0) : int(last) + 1]
+    return np.union1d(out, part[thin_rows(values[part], POINTS)]) if len(part) else out
 
 
 def _words(values: TextColumn) -> dict[str, Any]:

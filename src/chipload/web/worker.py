@@ -85,8 +85,8 @@ def first_line(job: str, overrides: Sequence[str], report: Progress) -> str:
     critical = result.critical
     if result.verdict is Verdict.EXCEEDS or critical is None:
         return result.first_lines[0]
-    said = (critical.value_text, critical.margin_text, critical.where)
-    return f"{result.verdict.value.capitalize()}: {', '.join(filter(None, said))}"
+    parts = (critical.value_text, critical.margin_text, critical.where)
+    return f"{result.verdict.value.capitalize()}: {', '.join(filter(None, parts))}"
 
 
 def _fault(err: Exception) -> str:
