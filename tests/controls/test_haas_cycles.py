@@ -75,7 +75,7 @@ def test_a_pause_at_the_bottom_of_a_pecked_hole(control, text, time):
     assert dwells(commands) == ([] if time is None else [time, time])
 
 
-@pytest.mark.parametrize("text", ["G13 I5. D1 F200.", "G70 I25. J15. L4"])
+@pytest.mark.parametrize("text", ["G13 I5. D0 F200.", "G12 I5. K9. Q2. D0 F200."])
 @pytest.mark.parametrize("control", ["fanuc", "okuma"])
 def test_a_fanuc_has_no_circular_pockets(control, text):
     head = "G21 G17 G90 G94\nT1 M6\nS1000 M3\nG0 X0. Y0. Z10.\n"
