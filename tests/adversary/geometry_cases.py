@@ -306,3 +306,41 @@ CASES = (
     Case("wall-leaning-thick", "nothing: the same wall 5 mm thick",
          leaning_slots((-7.5, 8.0), (7.5, 8.0), (-7.5, 16.0), (7.5, 16.0)), "holds", ""),
 )  # fmt: skip
+
+
+def corner(reach_mm: float, step_mm: float, degrees: float = 0.0) -> Change:
+    """A slot along y, then a rapid past the upright edge at X60 Y0, which reaches so far into the path of the cutter
+    (by less where the axis leans towards x).
+    """
+
+    def change(job: Job) -> None:
+        lean = math.radians(degrees)
+        axis = f"{math.sin(lean):.9f},0,{math.cos(lean):.9f}"
+        x, y = 60.0 + math.sqrt(0.5) * (5.0 - reach_mm), -math.sqrt(0.5) * (5.0 - reach_mm)
+        # the edge is passed where no instant of a step stands if the instants are 1.2 mm apart
+        places = [(x + at * math.sqrt(0.5), y + at * math.sqrt(0.5)) for at in (-40.3, 59.7)]
+        z = -2.0 + 5.0 * math.sin(lean)
+        rows = ["PARTNO/T", "UNITS/MM", "LOADTL/1", "SPINDL/6000,CLW", "MULTAX/ON", "RAPID", f"GOTO/30,-30,80,{axis}"]
+        rows += ["RAPID", f"GOTO/30,-30,{z:.6f},{axis}", "FEDRAT/900,MMPM", f"GOTO/30,70,{z:.6f},{axis}"]
+        rows += ["RAPID", f"GOTO/30,70,80,{axis}"]
+        for (a, b), heights in zip(places, ((80.0, -8.0), (-8.0, 80.0)), strict=True):
+            rows += [line for h in heights for line in ("RAPID", f"GOTO/{a:.6f},{b:.6f},{h},{axis}")]
+        job.files["p.apt"] = "\n".join([*rows, "SPINDL/OFF", "FINI"]) + "\n"
+        job.tables["program"] = {"file": "p.apt"}
+        job.tables["machine"] = {"name": "xyzbc-trunnion"}
+        job.tables["operation"][0]["step_mm"] = step_mm
+
+    return change
+
+
+CASES = (
+    *CASES,
+    Case("rapid-at-a-corner", "a rapid takes 0.05 mm of an edge of the block, in a step of 100 mm", corner(0.05, 100.0),
+         "exceeds", "rapid-cuts"),
+    Case("rapid-at-a-corner-leaning", "a rapid takes 0.2 mm of an edge of the block with a leaning axis",
+         corner(0.2, 2.0, 20.0), "exceeds", "rapid-cuts"),
+    Case("rapid-beside-a-corner", "nothing: a rapid passes 0.1 mm beside the edge", corner(-0.1, 100.0), "holds", ""),
+    Case("film-by-tolerance", "a rapid through 0.1 mm of the block with a leaning axis and tolerance_mm = 0.1",
+         changes(corner(-1.0, 2.0, 20.0), lambda job: job.tables["operation"][0].update(tolerance_mm=0.1)),
+         "unchecked", "rapids that take less than 0.4 mm of material"),
+)  # fmt: skip

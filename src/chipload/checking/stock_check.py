@@ -27,7 +27,7 @@ from chipload.simulation.heights.height_map import HeightMap, bands_of, follow_h
 from chipload.simulation.heights.loose_stock import find_loose_stock
 from chipload.simulation.heights.slender_walls import distortion_not_checked, find_slender_walls, slender_wall_findings
 from chipload.simulation.kept_pass import KeptPasses
-from chipload.simulation.moves import leans
+from chipload.simulation.moves import FILM, leans
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import Collision
 from chipload.stock.layers import LayeredStock
@@ -36,6 +36,8 @@ Floats = NDArray[np.float64]
 
 #: columns stand so many times as close where a shank or holder wider than its cutter goes below the top of the stock
 CLOSER = 3.0
+#: films that may be thicker [mm] are named where nothing else shows a rapid through material
+FILM_MM = 0.02
 
 
 def check_stock(
@@ -114,6 +116,9 @@ def _dips(cutter: Cutter, number: int, program: Program, high: Floats) -> bool:
 def _check_leaning_axis(inputs: CheckInputs, stock: LayeredStock) -> StockCheck:
     """What the check of a program whose axis leans cannot show."""
     checks, unchecked, hidden = inputs.checks, list[str](), 0.0
+    film = FILM * inputs.settings.tolerance_mm
+    if film > FILM_MM:
+        unchecked.append(f"rapids that take less than {film:.2g} mm of material: taken as films, by tolerance_mm")
     if checks.shank_in_stock:
         hidden = math.sqrt(3.0) * (inputs.settings.stock_points_mm or default_spacing(stock))
         unchecked.append(

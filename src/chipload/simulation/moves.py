@@ -72,6 +72,9 @@ FORCE, TORQUE = LOADS.index("force_n"), LOADS.index("torque_nm")
 OF_VOLUME = (1, 9)
 #: forces of instants that differ by no more than this share are alike
 ALIKE = 1e-3
+#: instants of rapids stand so many times as close: a corner that reaches h into the path of a radius R is met over
+#: sqrt(2 R h) of it, so that one of R / 800 is found; at those of cuts one of R / 32 was missed
+OF_RAPIDS = 5.0
 #: a rapid that takes less than so many tolerances, over the edge that it meets, meets a film left by chords
 FILM = 4.0
 
@@ -164,10 +167,11 @@ class MoveRun:
         pieces, flank, own = self.corner_slices, self.flank_mm, self._moving(steps)
         p0, p1, tool = steps.p0[own], steps.p1[own], steps.tool[own]
         poses = (p0, p1, steps.a0[own], steps.a1[own])
+        finer = np.where(steps.rapid[own], OF_RAPIDS, 1.0)
         if isinstance(self.stock, BrickStock):
-            found = self.stock.take(*poses, tool, corner_slices=pieces, flank_mm=flank)
+            found = self.stock.take(*poses, tool, corner_slices=pieces, flank_mm=flank, finer=finer)
         else:
-            found = self.stock.take(p0, p1, tool, corner_slices=pieces, flank_mm=flank)
+            found = self.stock.take(p0, p1, tool, corner_slices=pieces, flank_mm=flank, finer=finer)
         if self.shank is not None:
             at = np.flatnonzero(found.above)
             time = (found.instant[at] + 0.5) / found.instants[at]

@@ -183,10 +183,15 @@ class BrickStock:
         self.bricks = np.empty((0, 3), dtype=np.int32)
         self.moves, self.of = np.empty((0, 23)), np.empty(0, dtype=np.int64)
 
-    def instants(self, rows: Floats, tool: Ints) -> Ints:
-        """Return the number of instants (n,) at which each step is calculated: odd, to include the middle."""
+    def instants(self, rows: Floats, tool: Ints, finer: Floats | float = 1.0) -> Ints:
+        """Return the number of instants (n,) at which each step is calculated: odd, to include the middle.
+
+        Parameters
+        ----------
+        finer : (n,) float, how many times as close
+        """
         of = np.array([self.tools[n] for n in tool.tolist()], dtype=np.int64)
-        length = rows[:, 13] + rows[:, 12] * self.cutters["height"][of]
+        length = finer * (rows[:, 13] + rows[:, 12] * self.cutters["height"][of])
         more = np.maximum(0.5 * (length / (INSTANT * self.cutters["wide"][of]) - 1.0), 0.0)
         return np.asarray(2 * np.ceil(more - 1e-9).astype(np.int64) + 1)
 
@@ -205,6 +210,7 @@ class BrickStock:
         *,
         corner_slices: int,
         flank_mm: Mapping[int, float],
+        finer: Floats | float = 1.0,
     ) -> Engaged:
         """Make steps one after the other and return the engagement of each.
 
@@ -215,9 +221,11 @@ class BrickStock:
         tool : (n,) int
         corner_slices : slices of a range of a corner in contact, taken as ``FEW`` at least
         flank_mm : longest slice of the flank by tool number [mm]
+        finer : (n,) float, how many times as close its instants are
         """
+        each = np.broadcast_to(finer, len(tool))
         rows, tool, group = self._moves(p0, p1, a0, a1, tool)
-        count = np.where(group > 0, self.instants(rows, tool), 0)
+        count = np.where(group > 0, self.instants(rows, tool, each[np.cumsum(group > 0) - 1]), 0)
         found = self._run(rows, tool, group, count, corner_slices, flank_mm)
         if not self.tooth_rows:
             return found

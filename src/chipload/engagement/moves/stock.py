@@ -301,10 +301,15 @@ class MoveStock:
         self.moves, self.of = np.empty((0, 8)), np.empty(0, dtype=np.int64)
         self.lists, self.level, self.tops = np.empty((0, 4), dtype=np.int64), np.empty((0, 3)), np.empty(0)
 
-    def instants(self, p0: Floats, p1: Floats, tool: Ints) -> Ints:
-        """Return the number of instants (n,) at which each step is calculated: odd, to include the middle."""
+    def instants(self, p0: Floats, p1: Floats, tool: Ints, finer: Floats | float = 1.0) -> Ints:
+        """Return the number of instants (n,) at which each step is calculated: odd, to include the middle.
+
+        Parameters
+        ----------
+        finer : (n,) float, how many times as close
+        """
         radius = np.array([self.radii[self.tools[n]] for n in tool.tolist()]).reshape(len(p0))
-        length = np.linalg.norm(p1 - p0, axis=1)
+        length = finer * np.linalg.norm(p1 - p0, axis=1)
         more = np.maximum(0.5 * (length / (INSTANT * radius) - 1.0), 0.0)
         return np.asarray(2 * np.ceil(more - 1e-9).astype(np.int64) + 1)
 
@@ -312,7 +317,16 @@ class MoveStock:
         """Make steps without calculating their engagement."""
         self._run(p0, p1, tool, np.zeros(len(p0), dtype=np.int64), 1, dict.fromkeys(self.tools, 1.0))
 
-    def take(self, p0: Floats, p1: Floats, tool: Ints, *, corner_slices: int, flank_mm: Mapping[int, float]) -> Engaged:
+    def take(
+        self,
+        p0: Floats,
+        p1: Floats,
+        tool: Ints,
+        *,
+        corner_slices: int,
+        flank_mm: Mapping[int, float],
+        finer: Floats | float = 1.0,
+    ) -> Engaged:
         """Make steps one after the other and return the engagement of each.
 
         Parameters
@@ -321,8 +335,9 @@ class MoveStock:
         tool : (n,) int
         corner_slices : slices of the engaged part of a corner
         flank_mm : longest slice of the flank by tool number [mm]
+        finer : (n,) float, how many times as close its instants are
         """
-        return self._run(p0, p1, tool, self.instants(p0, p1, tool), corner_slices, flank_mm)
+        return self._run(p0, p1, tool, self.instants(p0, p1, tool, finer), corner_slices, flank_mm)
 
     def _run(
         self, p0: Floats, p1: Floats, tool: Ints, instants: Ints, pieces: int, flank_mm: Mapping[int, float]
