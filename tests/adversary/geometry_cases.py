@@ -344,3 +344,12 @@ CASES = (
          changes(corner(-1.0, 2.0, 20.0), lambda job: job.tables["operation"][0].update(tolerance_mm=0.1)),
          "unchecked", "rapids that take less than 0.4 mm of material"),
 )  # fmt: skip
+
+
+CASES = (
+    *CASES,
+    Case("power-of-a-long-step", "493 W at a limit of 300 W, over 10 mm of a step of 100 mm",
+         changes(stock(low_mm=(25.0, 0.0, -20.0), high_mm=(35.0, 40.0, 0.0)), stated("limits", power_w=300.0),
+                 lambda job: job.tables["operation"][0].update(step_mm=100.0)),
+         "unproven", "power_w"),
+)  # fmt: skip

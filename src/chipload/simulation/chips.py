@@ -33,6 +33,7 @@ from chipload.simulation.accuracy import (
 )
 from chipload.simulation.loads import (
     LOADS,
+    TORQUE_RISE,
     Cuts,
     join_cuts,
 )
@@ -61,6 +62,8 @@ Floats = NDArray[np.float64]
 
 #: volume of a chip that is the rounding of its layers, whose areas are sums of products of coordinates [mm^3]
 ROUNDING_MM3 = 1e-9
+#: columns that are means over a step of what a revolution has
+OF_STEPS = ("torque_mean_nm", "power_w")
 #: most steps of a simulation
 MOST_STEPS = 50_000_000
 #: blocks of steps that go together by moves
@@ -286,7 +289,24 @@ def resolution_error_of(
         return dict.fromkeys((*names, *WITH_FORCE), math.inf), {}
     blocks = StepBlocks(program, setting.resolution.step_mm, setting.resolution.tolerance)
     again = moves_again(setting, setting.run, columns)
-    return resolution_error(blocks, before, columns, setting, again, names)
+    found, parts = resolution_error(blocks, before, columns, setting, again, names)
+    rises = {
+        name: (1.0 + found[name]) * (1.0 + rise_within_steps(columns, name)) - 1.0 for name in OF_STEPS if name in found
+    }
+    return found | rises, parts
+
+
+def rise_within_steps(columns: Columns, name: str) -> float:
+    """Return how far a mean load over a revolution goes within a step above the greatest of the steps, relative.
+
+    >>> rise_within_steps({"power_w": np.array([100.0, 20.0]), "torque_rise": np.array([0.0, 9.0])}, "power_w")
+    1.0
+    """
+    if name not in columns or TORQUE_RISE not in columns:
+        return 0.0
+    values = np.asarray(columns[name])
+    worst = float(values.max(initial=0.0))
+    return float((values * (1.0 + np.asarray(columns[TORQUE_RISE]))).max()) / worst - 1.0 if worst > 0.0 else 0.0
 
 
 def require_steps(program: Program, step_mm: float) -> float:

@@ -42,6 +42,8 @@ LOADS = (
 )
 #: columns of how sure they are, one standard deviation; where the material says how sure its coefficients are
 BANDS = ("force_sd_n", "torque_sd_nm", "torque_mean_sd_nm", "power_sd_w")
+#: column of how far the mean torque over a revolution rises within a step above that of the step, relative
+TORQUE_RISE = "torque_rise"
 #: an engagement range ends where h = 0 if h is at most this share of its greatest
 GRAZES = 1e-6
 #: a mean normal shorter than this stands for surfaces that face each other

@@ -39,7 +39,7 @@ from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.program.program import Program
 from chipload.simulation.initial_stock import initial_stock, make_earlier, moves_of, skip_moves
-from chipload.simulation.loads import BANDS, LOADS, ONE_SIDE, Cuts, engaged_work
+from chipload.simulation.loads import BANDS, LOADS, ONE_SIDE, TORQUE_RISE, Cuts, engaged_work
 from chipload.simulation.section_outlines import Marks, nested_outlines
 from chipload.simulation.shank import ShankContact
 from chipload.simulation.steps import ROWS, Steps, steps_in_blocks
@@ -65,8 +65,8 @@ UPRIGHT = 1e-9
 #: columns of the loads that are means, of :data:`chipload.simulation.loads.LOADS`
 MEANS = np.array([0, 1, 2, 10, 12, 15, 16])
 LEAST = np.array([6, 7, 8])
-#: of the columns, the greatest force and the greatest torque
-FORCE, TORQUE = LOADS.index("force_n"), LOADS.index("torque_nm")
+#: of the columns, the greatest force, and the greatest and the mean torque
+FORCE, TORQUE, MEAN_TORQUE = (LOADS.index(name) for name in ("force_n", "torque_nm", "torque_mean_nm"))
 #: instants of steps that are unlike the one before, where no loads are wanted: the volume of six impeller programs
 #: differs by at most 0.03 % from that with the middle of each third too
 OF_VOLUME = (1, 9)
@@ -95,7 +95,8 @@ class Moved:
     ----------
     removed : (n, 4) volume [mm^3], pieces and layers of each chip, length of the shank in material [mm]
     loads : (n, len(LOADS))
-    bands : (n,) each, columns of :data:`chipload.simulation.loads.BANDS`; none where the material has no band
+    bands : (n,) each, columns of :data:`chipload.simulation.loads.BANDS`, none where the material has no band, and
+        :data:`chipload.simulation.loads.TORQUE_RISE`
     basis : (4, 6) integral over the time in cut of the factors of the coefficients
     cuts : tooth engagement, one for each cutter
     other : the same with the loads of a further material; None: there is none
@@ -335,6 +336,7 @@ def remove_by_moves(
         raise MaterialAboveFlutes(int(steps.line[k]), int(steps.tool[k]))
     removed, loads, basis, cuts = np.zeros((n, 4)), np.zeros((n, len(LOADS))), np.zeros((4, 6)), list[Cuts]()
     bands = {name: np.zeros(n) for name in BANDS} if material.has_band and with_loads else {}
+    torque = np.zeros(n)
     removed[:, 0] = np.bincount(found.step, found.volume / found.instants, n)
     np.maximum.at(removed[:, 1], found.step, found.areas)
     removed[:, 2] = _layers(found, run.layers, n)
@@ -360,6 +362,7 @@ def remove_by_moves(
         each, at, mean = loads_of_instants(plain, engagement, cutter, material, rotation, left, spindle, seconds)
         weight = 1.0 / found.instants[entries]
         _merge_instants(loads, step, each, weight)
+        np.maximum.at(torque, step, each[:, MEAN_TORQUE])
         if material.has_band:
             some = turned_basis(mean, engagement.frames)
             basis = basis + np.tensordot(steps.seconds[step] * weight, some, 1)
@@ -367,6 +370,9 @@ def remove_by_moves(
             for name, column in zip(BANDS, values, strict=True):
                 bands[name][own] = column
         cuts.append(_cuts(number, cutter, first, steps, found, entries, plain, each[:, FORCE]))
+    if with_loads:
+        mean = loads[:, MEAN_TORQUE]
+        bands[TORQUE_RISE] = np.divide(torque, mean, out=np.ones(n), where=mean > 0.0) - 1.0
     return Moved(removed, loads, bands, basis, cuts)
 
 
