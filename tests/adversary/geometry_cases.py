@@ -353,3 +353,28 @@ CASES = (
                  lambda job: job.tables["operation"][0].update(step_mm=100.0)),
          "unproven", "power_w"),
 )  # fmt: skip
+
+
+#: the axis leans by 0.01 deg, so that the columns of an upright axis do not follow it
+DWELL_AND_RAPID = """G21 G90 G17 G94
+G54
+T1 M6
+G43 H1
+S6000 M3
+G0 X30 Y-30 Z80 B0.01
+G0 Z-2
+G1 Y70 F900
+M5
+G0 Z80
+G0 X50 Y-30
+G0 Z-6
+G4 P0.5 G0 Y70
+G0 Z80
+M2
+"""
+CASES = (
+    *CASES,
+    Case("rapid-behind-a-dwell", "a rapid through the block in the line of a dwell, the spindle at rest",
+         changes(lambda job: job.tables.update(machine={"name": "xyzbc-trunnion"}), program(DWELL_AND_RAPID)),
+         "exceeds", "rapid-cuts"),
+)  # fmt: skip

@@ -201,11 +201,12 @@ def test_a_holder_in_the_stock_is_a_collision() -> None:
 
 
 @pytest.mark.parametrize("lying", [True, False])
-def test_a_rapid_and_a_spindle_at_rest_in_the_stock_exceed(lying: bool) -> None:
+def test_a_rapid_and_a_spindle_at_rest_or_reversed_in_the_stock_exceed(lying: bool) -> None:
     """The cutter leaves the block in the same step, so the last instants of that step take next to nothing."""
     cut = slot(1, lying)
     still = replace(cut, spindle=np.zeros(len(cut)))
     hasty = replace(cut, motion=np.full(len(cut), RAPID), feed=np.zeros(len(cut)))
-    for program, code in ((still, SPINDLE_OFF), (hasty, "rapid-cuts")):
+    against = replace(cut, spindle=-cut.spindle)
+    for program, code in ((still, SPINDLE_OFF), (hasty, "rapid-cuts"), (against, "spindle-reversed")):
         (one,) = removed(written(program))
         assert [(f.code, f.severity) for f in one.findings] == [(code, Severity.EXCEEDS)]

@@ -21,7 +21,7 @@ from chipload.errors import Finding, InputError
 from chipload.number_text import number_text
 from chipload.program.check import SPINDLE_OFF
 from chipload.program.motions import lengths
-from chipload.program.program import RAPID, Program
+from chipload.program.program import DWELL, RAPID, Program
 from chipload.progress import Progress, silent
 from chipload.simulation.accuracy import (
     COMPARED,
@@ -397,7 +397,8 @@ def removal_of(
         sd = deviations(sums.basis / sums.cut_s, material) if sums.cut_s > 0.0 else np.zeros(4)
         band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     # rapids that cut more than films
-    resting = set(program.line[(program.motion != RAPID) & (program.spindle == 0.0)].tolist())
+    feeds = ~np.isin(program.motion, (RAPID, DWELL))
+    resting = set(program.line[feeds & (program.spindle == 0.0)].tolist())
     rapids = [line for line in sums.rapids if line not in resting]
     found = [Finding("rapid-cuts", line, "a rapid goes through material") for line in rapids]
     if lines := [line for line in sums.rapids if line in resting]:

@@ -22,15 +22,15 @@ def reversed_cuts(steps: StepBlocks, columns: Columns, cutters: Mapping[int, Cut
     Parameters
     ----------
     steps : of the program, one for each row of ``columns``
-    columns : of the removal; a step that cuts has a force
+    columns : of the removal; a step that cuts has an engaged surface, and without loads no force
     """
     left = np.array(sorted(n for n, c in cutters.items() if c.left_hand), dtype=np.int64)
     if not len(left) and not (np.asarray(steps.program.spindle) < 0.0).any():
         return ()
-    force, out, at = np.asarray(columns["force_n"]), dict[int, Finding](), 0
+    pieces, out, at = np.asarray(columns["chip_areas"]), dict[int, Finding](), 0
     for block in steps:
         own = np.where(np.isin(block.tool, left), -1.0, 1.0)
-        wrong = (own * block.spindle < 0.0) & (force[at : at + len(block)] > 0.0)
+        wrong = (own * block.spindle < 0.0) & ~block.rapid & (pieces[at : at + len(block)] > 0)
         for number, k in zip(*np.unique(block.tool[wrong], return_index=True), strict=True):
             row = int(np.flatnonzero(wrong)[k])
             out.setdefault(
