@@ -350,6 +350,19 @@ CASES = (
         "tool-change-in-stock",
     ),
     Case(
+        "drill-long-step",
+        "a drill pushes by 486 N at a limit of 420 N, over the last quarter of a step of 100 mm",
+        changes(
+            DRILLING,
+            stated("stock", low_mm=(0.0, 0.0, -5.0)),
+            stated("limits", force_n=420.0),
+            hole("G81 X30 Y20 Z-10 R20 F600", 3000),
+            lambda job: job.tables["operation"][0].update(step_mm=100.0),
+        ),
+        "exceeds",
+        "force_n",
+    ),
+    Case(
         "deep-hole",
         "a hole of 12.7 diameters in one motion",
         changes(DRILLING, hole("G81 X30 Y20 Z-76 R2 F600", 6000), cutter(flute_length_mm=80.0, overhang_mm=100.0)),

@@ -19,7 +19,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.drilling import drill_loads, has_lips, lip_angle
 from chipload.cutting.material import Material
 from chipload.simulation.holes import AXIAL, AXIAL_DEG, AXIS, down_axis
-from chipload.simulation.loads import Cuts
+from chipload.simulation.loads import TORQUE_RISE, Cuts
 from chipload.simulation.ramp import ramp_angle
 from chipload.simulation.removal import Removal
 from chipload.units import rpm_from_rad_s
@@ -59,7 +59,9 @@ def _put_in(
 ) -> None:  # fmt: skip
     """Put the loads of one drill into copies of the columns."""
     feed = np.asarray(columns["feed_mm_min"])[rows] / (rpm_from_rad_s(1.0) * spindle_speed(columns)[rows])
-    lips = np.asarray(columns["torque_mean_nm"])[rows] * 1e3
+    # the thrust is that of the revolution with the greatest torque of the step
+    over = 1.0 + np.asarray(columns[TORQUE_RISE])[rows] if TORQUE_RISE in columns else np.ones(len(rows))
+    lips = np.asarray(columns["torque_mean_nm"])[rows] * over * 1e3
     under = np.asarray(columns["ramp_deg"])[rows] >= AXIAL_DEG
     loads = drill_loads(cutter, material, feed, lips, under)
     thrust[rows] = loads.thrust
@@ -73,15 +75,17 @@ def _put_in(
             out.setdefault(name, np.array(columns[name], dtype=np.float64))[rows] *= factor
     axis = np.column_stack([np.asarray(columns[name])[rows] for name in AXIS])
     old = np.column_stack([np.asarray(columns[name])[rows] for name in FORCES[0]])
-    along = (old * axis).sum(axis=1)
-    for names in FORCES:
+    along = (old * axis).sum(axis=1) * over
+    for names, share in zip(FORCES, (1.0 / over, 1.0, 1.0), strict=True):
         for name, part in zip(names, axis.T, strict=True):
-            out.setdefault(name, np.array(columns[name], dtype=np.float64))[rows] += (loads.thrust - along) * part
+            out.setdefault(name, np.array(columns[name], dtype=np.float64))[rows] += (
+                share * (loads.thrust - along) * part
+            )
     size = np.asarray(columns["force_n"])[rows]
     whole = np.hypot(np.sqrt(np.clip(size**2 - along**2, 0.0, None)), loads.thrust)
     out.setdefault("force_n", np.array(columns["force_n"], dtype=np.float64))[rows] = whole
     if "force_sd_n" in columns:
-        sd = np.asarray(columns["torque_mean_sd_nm"])[rows] * 1e3 / lips * whole
+        sd = np.asarray(columns["torque_mean_sd_nm"])[rows] * over * 1e3 / lips * whole
         out.setdefault("force_sd_n", np.array(columns["force_sd_n"], dtype=np.float64))[rows] = sd
 
 
