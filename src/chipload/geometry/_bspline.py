@@ -117,11 +117,10 @@ def facing_of(
 @njit(cache=True, nogil=True)
 def shape_of(
     knots_u: Any, knots_v: Any, control: Any, side: int, p: int, q: int, u: Any, v: Any, points: Any, normals: Any,
-    curvatures: Any, tangents: Any,
+    tangents: Any, bends: Any,
 ) -> bool:  # fmt: skip
-    """Points, unit normals (k, 3), curvature tensors (k, 3, 3), S_u and S_v (2, k, 3); False where there is no normal.
-
-    With E, F, G of the first form the rows of I^-1 J^T are (G S_u - F S_v) / det and (E S_v - F S_u) / det.
+    """Points, unit normals (k, 3), S_u and S_v (2, k, 3), S_uu, S_uv and S_vv (3, k, 3); False where there is no
+    normal.
     """
     N, M = np.empty((3, p + 1)), np.empty((3, q + 1))
     # S, S_u, S_v, S_uu, S_uv, S_vv
@@ -148,20 +147,12 @@ def shape_of(
                 s[5, c] += N[0, a] * r2
         a0, a1, a2, b0, b1, b2 = s[1, 0], s[1, 1], s[1, 2], s[2, 0], s[2, 1], s[2, 2]
         x, y, z = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
-        det = x * x + y * y + z * z
-        length = math.sqrt(det)
+        length = math.sqrt(x * x + y * y + z * z)
         if length == 0.0:
             return False
-        x, y, z = side * x / length, side * y / length, side * z / length
-        normals[k, 0], normals[k, 1], normals[k, 2] = x, y, z
-        E, F, G = a0 * a0 + a1 * a1 + a2 * a2, a0 * b0 + a1 * b1 + a2 * b2, b0 * b0 + b1 * b1 + b2 * b2
-        L = s[3, 0] * x + s[3, 1] * y + s[3, 2] * z
-        m = s[4, 0] * x + s[4, 1] * y + s[4, 2] * z
-        n = s[5, 0] * x + s[5, 1] * y + s[5, 2] * z
+        normals[k, 0], normals[k, 1], normals[k, 2] = side * x / length, side * y / length, side * z / length
         for c in range(3):
             points[k, c], tangents[0, k, c], tangents[1, k, c] = s[0, c], s[1, c], s[2, c]
-            f, g = (G * s[1, c] - F * s[2, c]) / det, (E * s[2, c] - F * s[1, c]) / det
             for d in range(3):
-                t, w = (G * s[1, d] - F * s[2, d]) / det, (E * s[2, d] - F * s[1, d]) / det
-                curvatures[k, c, d] = L * f * t + m * (f * w + g * t) + n * g * w
+                bends[d, k, c] = s[3 + d, c]
     return True

@@ -135,7 +135,7 @@ class BSplinePatch:
         return points, normals
 
     def shape(self, u: ArrayLike, v: ArrayLike) -> LocalShape:
-        """Points, normals, curvature tensors and tangents: as the other methods, in a tenth of their time.
+        """Points, normals, curvature tensors and tangents: as the other methods, in less time.
 
         Raises
         ------
@@ -154,10 +154,16 @@ class BSplinePatch:
         x, y = a.ravel(), b.ravel()
         _require_within(self.knots_u, p, x)
         _require_within(self.knots_v, q, y)
-        out = LocalShape(*(np.empty(size) for size in ((len(x), 3), (len(x), 3), (len(x), 3, 3), (2, len(x), 3))))
-        if not _bspline.shape_of(self.knots_u, self.knots_v, self.control, self.side, p, q, x, y, *out):
+        points, N, tangents, bends = (np.empty((*size, len(x), 3)) for size in ((), (), (2,), (3,)))
+        if not _bspline.shape_of(
+            self.knots_u, self.knots_v, self.control, self.side, p, q, x, y, points, N, tangents, bends
+        ):  # fmt: skip
             raise InputError(_NO_NORMAL)
-        return out
+        J = np.stack([tangents[0], tangents[1]], axis=-1)
+        second = [np.einsum("kd,kd->k", one, N) for one in bends]
+        II = np.stack([np.stack(second[:2], axis=-1), np.stack(second[1:], axis=-1)], axis=-2)
+        A = np.linalg.solve(np.swapaxes(J, 1, 2) @ J, np.swapaxes(J, 1, 2))
+        return LocalShape(points, N, np.swapaxes(A, 1, 2) @ II @ A, tangents)
 
     def curvature(self, u: ArrayLike, v: ArrayLike) -> Floats:
         """Curvature tensors K (k, 3, 3) [1/mm], positive towards :meth:`normal`."""
