@@ -87,9 +87,9 @@ def program_presentation(
 
 
 def _blanks(program: ProgramResult, result: Result) -> dict[str, Blank]:
-    """Return the initial stock for the page; it is the same for every track."""
+    """Return the initial stock and the cutters for the page, the same for every track."""
     simulated = program.simulated
-    if simulated is None or simulated.collisions.stock.blank is None:
+    if simulated is None:
         return {}
     return {track.name: Blank(simulated.collisions.stock.blank, program.cutters) for track in result.tracks}
 

@@ -45,8 +45,8 @@ def _of_setups(program: SetupsProgram) -> Presentation:
         return out
 
     def blanks() -> dict[str, Blank]:
-        found = [one.simulated.collisions.stock.blank if one.simulated is not None else None for one in program.setups]
-        return {setup_name(k): Blank(mesh, program.cutters) for k, mesh in enumerate(found) if mesh is not None}
+        found = {k: one.simulated for k, one in enumerate(program.setups) if one.simulated is not None}
+        return {setup_name(k): Blank(s.collisions.stock.blank, program.cutters) for k, s in found.items()}
 
     def samples() -> dict[str, EngagementSamples]:
         found = [one.simulated.removal.samples if one.simulated is not None else None for one in program.setups]
