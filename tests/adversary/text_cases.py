@@ -106,6 +106,13 @@ CASES = (
         "nc-offset-unset",
     ),
     Case(
+        "machine-coordinates-down",
+        "a feed to a height of the machine, whose work offset is not stated",
+        replaced("G0 Z10\nM5", "G53 G1 Z-300\nG0 Z10\nM5"),
+        "unproven",
+        "nc-machine-coordinates",
+    ),
+    Case(
         "machine-coordinates",
         "G53 without a stated work offset",
         replaced("G0 Z10\nM5", "G53 G0 X10\nM5"),

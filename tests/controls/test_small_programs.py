@@ -85,3 +85,10 @@ def test_a_home_position_that_nobody_states_is_no_motion(control, away):
     assert ends(commands)[-2:].tolist() == [[20, 0, 5], [0, 0, 5]]
     at_home = read(f"#5181=4 #5182=6 #5183=90\n{away}", control, head=HEAD)[0]
     assert away != "G30" or ends(at_home)[-1].tolist() == [4, 6, 90]
+
+
+@pytest.mark.parametrize("control", ["grbl", "linuxcnc", "haas", "fanuc"])
+@pytest.mark.parametrize("away", ["G53 G0 Z-300.", "G53 G1 Z-5. F500.", "G20\nG53 G0 Z-4."])
+def test_a_motion_down_in_the_coordinates_of_the_machine_is_no_retraction(control, away):
+    _, findings = read(f"G1 Z-1. F100.\nG0 Z5.\n{away}", control, head=HEAD)
+    assert [f.severity for f in findings if f.code == "nc-machine-coordinates"] == [Severity.UNPROVEN]

@@ -146,7 +146,7 @@ def _pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         raise InputError(f"Q{hole.peck:g}: the depth of a peck must be above 0")
     if (hole.r - hole.bottom) / hole.peck > MOST_PECKS:
         raise InputError(f"Q{hole.peck:g}: makes more than {MOST_PECKS} pecks: raise it")
-    shorter, least, lift = hole.pecks[:3]
+    shorter, least, lift = hole.pecks.shorter, hole.pecks.least, hole.pecks.lift
     if shorter < 0.0 or (shorter > 0.0 and not 0.0 < least <= hole.peck):
         raise InputError(
             f"I{hole.peck:g} J{shorter:g} K{least:g}: pecks become shorter by J, 0 or more, down to K, which must be "

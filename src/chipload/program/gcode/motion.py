@@ -29,6 +29,8 @@ from chipload.program.gcode.words import Block
 #: a touch is sought over at least this [mm]
 LEAST_PROBE = 0.254
 MOST_TURNS = 100_000
+#: a rapid to a lower height of the machine [mm], counted from the top of its travel, is no retraction
+RETRACTED_MM = -100.0
 
 
 class ControllerMotion:
@@ -86,10 +88,12 @@ class ControllerMotion:
             if not state.absolute and 900 not in block.g:
                 raise InputError(f"{c.machine_word}: goes with G90 only")
             c.not_compensated(c.machine_word)
-            if in_machine_unknown(c, c.machine_word, axes(self.c, block)):
+            given = axes(self.c, block)
+            lower = code == 10 or given.get(2, 0.0) < RETRACTED_MM
+            if in_machine_unknown(c, c.machine_word, given, lower):
                 return
             note_machine_coordinates(c, c.machine_word)
-            to = c.position(put(c.machine_position(), axes(self.c, block)))
+            to = c.position(put(c.machine_position(), given))
         else:
             goal = end(self.c, block)
             to = self._turned_end(goal)

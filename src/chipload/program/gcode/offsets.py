@@ -324,12 +324,12 @@ def _shift(c: Controller, code: int, axes: Axes) -> None:
     c.rebase(replace(datum, shift=new))
 
 
-def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
+def in_machine_unknown(c: Controller, name: str, axes: Axes, towards_work: bool = False) -> bool:
     """Whether a motion in the machine's coordinates is left out, as where they lie is not known; a finding says so.
 
     A strict LinuxCNC takes the offsets and home positions of its parameters, unset ones as 0; so does one whose
-    parameters state any. A motion along Z is a retraction; one in X and Y before it may go through the work, which
-    stays unproven.
+    parameters state any. A motion along Z is a retraction; one in X and Y before it, or ``towards_work``, may go
+    through the work, which stays unproven.
     """
     number = c.state.datum.number
     stated = c.strict or any(5161 <= k < 5390 for k in c.parameters.numbered)
@@ -341,7 +341,7 @@ def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
     ):
         return False
     here = c.state.at
-    if set(axes) & {0, 1} and 2 not in axes and c.retracted != here:
+    if towards_work or (set(axes) & {0, 1} and 2 not in axes and c.retracted != here):
         c.once(
             "nc-machine-coordinates",
             f"{name}: moves in the machine's coordinates, where the origin of {_offset_name(number)} is not known: "
@@ -354,7 +354,7 @@ def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
             f"{name}: a retraction to a position of the machine is left out: state "
             f"{_offset_name(number)} in program.work_offsets to have it",
         )
-    if 2 in axes:
+    if 2 in axes and not towards_work:
         c.retracted = here
     return True
 
