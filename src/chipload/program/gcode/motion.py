@@ -88,12 +88,12 @@ class ControllerMotion:
             if not state.absolute and 900 not in block.g:
                 raise InputError(f"{c.machine_word}: goes with G90 only")
             c.not_compensated(c.machine_word)
-            given = axes(self.c, block)
-            lower = code == 10 or given.get(2, 0.0) < RETRACTED_MM
-            if in_machine_unknown(c, c.machine_word, given, lower):
+            target = axes(self.c, block)
+            lower = code == 10 or target.get(2, 0.0) < RETRACTED_MM
+            if in_machine_unknown(c, c.machine_word, target, lower):
                 return
             note_machine_coordinates(c, c.machine_word)
-            to = c.position(put(c.machine_position(), given))
+            to = c.position(put(c.machine_position(), target))
         else:
             goal = end(self.c, block)
             to = self._turned_end(goal)
