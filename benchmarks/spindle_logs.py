@@ -1,38 +1,40 @@
-"""Current and power of measured spindles in runs that were not used to learn them, and material told from air.
+"""Current, power and force of measured cuts that were not used to learn them, and material told from air.
 
     CHIPLOAD_DATA=... python benchmarks/spindle_logs.py
 
-Prints the table of docs/design/control.md. First a mill in wax: for each condition (feed, wear of the tool) the mean
-current and power in the cut of one run predict those of another run, with the 95 % band of what is predicted (the
+Prints tables of docs/design/control.md. First a mill in wax (UMich): for each condition (feed, wear of the tool) the
+mean current and power in the cut of one run predict those of another run, with the 95 % band of what is predicted (the
 scatter of the learned run over a second, and the error of a model that `chipload watch` takes); the error of a mean
 over a second, and the share of seconds in the band; and the share of pairs of a second in the cut and one in the air
 of which the first is estimated greater, by the idle map of the air of the run that was learned from (50 %: not told
-apart). Then an industrial spindle, whose idle current is that of the air before its first passes. Last, three cutters
-that were worn out in 315 cuts each (PHM 2010): the cut at which the test of `chipload watch` states that the force
-has grown by 30 %, learned from cuts 11 to 30, and the wear there and at the end; how often it states that in force
-without wear, whose noise is that of the same cutters (blocks of ten cuts of the force over its moving median, drawn
-at random), and in how many of thirty beginnings of the learned cuts it does so before the end, and how many of cuts
-31 to 60 are in the 95 % band of the learned ones. And 16 cutters with one sample of the current a run (NASA): the
-share whose sum of rises over the first runs passes, before a wear of 0.3 to 0.6 mm, what 5 % of them pass with their
-runs in random order.
+apart). Then an industrial spindle, whose idle current is that of the air before its first passes; the current of each
+cutter of NASA, predicted by the mean of the others in its condition (depth, feed, material) with the band of their
+scatter; and three slots (Li), whose forces at one feed are predicted from the coefficients fitted at the other two.
+`benchmarks/wear_logs.py` has what the same data say of wear.
 """
 
 import csv
 import math
 import os
+import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import t as student
 
-from chipload.control.load_watch import MODEL_ERROR, SequentialTest, WatchSettings
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "real"))
+
+import test_flat_slotting as slotting
+
+from chipload.control.load_watch import MODEL_ERROR
 from chipload.control.logs import read_log
 from chipload.control.spindle import estimate, idle_map
+from chipload.jobs import load_job
+from chipload.jobs.fit.run import run
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2] / "shared" / "data")) / "measured"
-PHM, LEARNED, NEXT = DATA / "nasa_phm_tables" / "phm2010", slice(10, 30), slice(30, 60)
 NASA = DATA / "nasa_uc_milling" / "mill.csv"
-#: cuts of a moving median and of a block that is drawn, streams that are drawn; first runs of a cutter of NASA
-AROUND, BLOCK, STREAMS, SHARP = 31, 10, 300, 3
 MILL, TRACE = DATA / "umich_smart_cnc", DATA / "nasa_uc_milling" / "tool54_example.csv"
 COLUMNS = {
     "sample_s": 0.1,
@@ -126,81 +128,50 @@ def industrial():
     return apart(found.torque[~cut][::TURN], found.torque[cut][::TURN]), found.trusted[cut], found.trusted[~cut]
 
 
-def forces_and_wear(case):
-    """Force in the plane [N] and greatest wear of a tooth [um] of each cut."""
-    with (PHM / "feature_vector.csv").open() as file:
-        rows = [r for r in csv.DictReader(file) if r["case"] == case]
-    force = [math.hypot(float(r["force_x__rms"]), float(r["force_y__rms"])) for r in rows]
-    with (PHM / "process_info.csv").open() as file:
-        wear = [max(float(r[f"VB_flute_{k}"]) for k in (1, 2, 3)) for r in csv.DictReader(file) if r["case"] == case]
-    return np.array(force), np.array(wear)
-
-
-def alarm_after(force, learned):
-    """Cut at whose end the test states a growth of 30 %; None: it does not."""
-    own = force[learned]
-    mean = float(own.mean())
-    # a: the end of the interval of the mean, b: 30 % above the mean, or above that end
-    high = mean + 3.0 * float(own.std(ddof=1)) / math.sqrt(len(own))
-    fault, variance = max(1.3 * mean, 1.1 * high), float(own.var(ddof=1)) + (MODEL_ERROR * mean) ** 2
-    test = SequentialTest(WatchSettings().threshold)
-    for k in range(learned.stop, len(force)):
-        if test.add(((force[k] - high) ** 2 - (force[k] - fault) ** 2) / (2.0 * variance), k):
-            return k
-    return None
-
-
-def in_band(force):
-    """Share of the next cuts whose force is in the 95 % band of the learned ones."""
-    own = force[LEARNED]
-    half = Z95 * math.hypot(MODEL_ERROR * own.mean(), own.std(ddof=1) * math.sqrt(1.0 + 1.0 / len(own)))
-    return float((np.abs(force[NEXT] - own.mean()) < half).mean())
-
-
-def without_wear(force, generator):
-    """A stream as long, without growth: blocks of the force over its moving median."""
-    half = AROUND // 2
-    padded = np.pad(force, half, mode="reflect")
-    ratio = force / np.array([np.median(padded[k : k + AROUND]) for k in range(len(force))])
-    first = generator.integers(0, len(ratio) - BLOCK, size=len(ratio) // BLOCK + 1)
-    return np.concatenate([ratio[k : k + BLOCK] for k in first])[: len(ratio)]
-
-
-def greatest_rise(current, worn, deviation):
-    """Greatest sum of the rises of the current above that of the first runs and half a deviation, up to a worn run."""
-    total = most = 0.0
-    for x in current[SHARP:worn]:
-        total = max(total + (x - np.mean(current[:SHARP])) / deviation - 0.5, 0.0)
-        most = max(most, total)
-    return most
-
-
-def drift_of_samples(limit_mm):
-    """Cutters of NASA that reach a wear, share of them whose current rises before it beyond chance, and correlation of
-    current and wear within the cutters.
+def currents_of_cutters():
+    """Error of the mean current of each cutter of NASA, by the others in its condition, and whether each of its runs is
+    in their band.
     """
     with NASA.open() as file:
         # samples below 1 V were not taken in the cut
         rows = [r for r in csv.DictReader(file) if float(r["smcDC"]) > 1.0]
-    tools, both = [], []
-    for case in range(1, 17):
-        own = [r for r in rows if r["case"] == str(case)]
-        current = np.array([float(r["smcDC"]) for r in own])
-        wear = np.array([float(r["VB"] or "nan") for r in own])
-        known = np.isfinite(wear)
-        if known.sum() > 2:
-            both.append(np.column_stack([current[known] - current[known].mean(), wear[known] - wear[known].mean()]))
-        worn = np.flatnonzero(wear >= limit_mm)
-        if len(worn) and worn[0] > SHARP:
-            tools.append((current, int(worn[0])))
-    deviation = float(np.concatenate([c - c.mean() for c, _ in tools]).std())
-    g = np.random.default_rng(1)
-    chance = [
-        greatest_rise(g.permutation(current[:worn]), worn, deviation) for current, worn in tools for _ in range(STREAMS)
-    ]
-    threshold = float(np.quantile(chance, 0.95))
-    found = np.mean([greatest_rise(current, worn, deviation) > threshold for current, worn in tools])
-    return len(tools), float(found), float(np.corrcoef(np.concatenate(both).T)[0, 1])
+    errors, inside = [], []
+    for case in sorted({r["case"] for r in rows}, key=int):
+        own = [r for r in rows if r["case"] == case]
+        condition = [own[0][key] for key in ("DOC", "feed", "material")]
+        others = np.array(
+            [
+                float(r["smcDC"])
+                for r in rows
+                if r["case"] != case and [r[key] for key in ("DOC", "feed", "material")] == condition
+            ]
+        )
+        if len(others) < 3:
+            continue
+        seen, n = np.array([float(r["smcDC"]) for r in own]), len(others)
+        half = student.ppf(0.975, n - 1) * others.std(ddof=1) * math.sqrt(1.0 + 1.0 / n)
+        errors.append(others.mean() / seen.mean() - 1.0)
+        inside.append(np.abs(seen - others.mean()) < half)
+    return np.array(errors), np.concatenate(inside)
+
+
+def slots():
+    """Feed [mm/min], error of the mean force along the feed, across it and along the axis, half of its band at 95 %
+    over the force, and the share of turns whose mean is in the band of a turn.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = slotting.job(Path(folder)).path
+        text = path.read_text().replace('use = "predict"', 'use = "fit"')
+        for feed in (300, 900, 1500):
+            head, tail = text.split(f"f{feed}ap3ae25.csv", 1)
+            held_out = tail.replace('use = "fit"', 'use = "predict"', 1)
+            path.write_text(f"{head}f{feed}ap3ae25.csv{held_out}")
+            done = run(load_job(path).job)
+            (third,) = [c for c in done.comparisons if c.use == "predict"]
+            mean, half = third.predicted.mean, third.predicted.half[0]
+            turn = np.hypot(half, Z95 * np.nanstd(third.turns.mean, axis=0, ddof=1))
+            share = (np.abs(third.turns.mean - mean) < turn).mean(axis=0)
+            yield feed, mean / third.forces.mean - 1.0, half / np.abs(third.forces.mean), share
 
 
 def main():
@@ -232,30 +203,23 @@ def main():
         f"the cut, {100 * air.mean():.1f} % of those in the air"
     )
 
+    errors, inside = currents_of_cutters()
     print(
-        "\n| cutter of PHM 2010 | wear learned at um | alarm in cut | wear there um | wear at the end um "
-        "| alarm without wear % | cuts 31 to 60: mean % | in the band % |"
+        f"\nNASA, one sample of the current a run: the means of {len(errors)} cutters by others in their condition "
+        f"within {100 * np.abs(errors).max():.1f} %; {100 * inside.mean():.0f} % of {len(inside)} samples in the 95 % "
+        "band"
     )
-    print("|---" * 8 + "|")
-    seen, g = 0, np.random.default_rng(1)
-    for case in ("1", "4", "6"):
-        force, wear = forces_and_wear(case)
-        cut = alarm_after(force, LEARNED)
-        there = "" if cut is None else f"{wear[cut]:.0f}"
-        false = np.mean([alarm_after(without_wear(force, g), LEARNED) is not None for _ in range(STREAMS)])
-        print(
-            f"| {case} | {wear[LEARNED.stop - 1]:.0f} | {cut if cut is None else cut + 1} | {there} | {wear[-1]:.0f} | "
-            f"{100 * false:.0f} | {100 * (force[LEARNED].mean() / force[NEXT].mean() - 1.0):+.1f} | "
-            f"{100 * in_band(force):.0f} |"
-        )
-        seen += sum(alarm_after(force, slice(first, first + 20)) is not None for first in range(10, 110, 10))
-    print(f"\n{seen} of 30 beginnings of the learned cuts end with an alarm")
-    for limit in (0.3, 0.45, 0.6):
-        tools, found, correlation = drift_of_samples(limit)
-        print(
-            f"NASA, one sample of the current a run: of {tools} cutters {100 * found:.0f} % rise before a wear of "
-            f"{limit:g} mm beyond what 5 % do by chance; correlation of current and wear {correlation:.2f}"
-        )
+    print("\n| feed of the slot mm/min | mean force along, across, axis % | band % | turns in the band % |")
+    print("|---" * 4 + "|")
+    held, near = [], []
+    for feed, error, half, share in slots():
+        texts = [
+            ", ".join(f"{100 * x:{form}}" for x in v) for v, form in ((error, "+.1f"), (half, ".1f"), (share, ".0f"))
+        ]
+        print(f"| {feed} | {' | '.join(texts)} |")
+        held += list(np.abs(error) <= half)
+        near += list(np.abs(error) <= GOAL)
+    print(f"\n{sum(held)} of {len(held)} means in their band; {sum(near)} within {100 * GOAL:g} %")
 
 
 if __name__ == "__main__":
