@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 
 import numpy as np
@@ -202,7 +203,7 @@ def _hold_by_pins(cell, monkeypatch, time, power, lines) -> None:
             return None if row is None else PinValues(row[0], 0, 0, 0, 20.0, 0, feed, current=row[1], line=row[2])
 
     monkeypatch.setattr(hal_client, "HalPins", Pins)
-    monkeypatch.setattr(machine_watch.time, "sleep", lambda _: None)
+    monkeypatch.setattr(machine_watch, "machine_samples", partial(machine_watch.machine_samples, sleep=lambda _: None))
     words = ["watch", "hal", "--job", cell / "job.toml", "--efficiency", "0.85", "--signal-pin", "vfd.power"]
     code, out, _ = call(*words, "--hold", "air", "--out", cell / "pins.csv")
     assert code == 3

@@ -131,14 +131,67 @@ def test_lag_of_the_sensor_is_found():
     assert found.material.Kte == pytest.approx(0.85 * PRIOR.Kte, rel=0.03)
 
 
-@pytest.mark.parametrize(("jump", "said"), [(40.0, r"40\.1 s"), (1e9, "1e9 s")])
-def test_a_clock_that_jumps_is_named(log, program, jump, said):
-    """Seconds, or those since 1970, are added in the middle of a program: without its lines it is refused, and the jump
+def test_a_clock_that_jumps_is_named(log, program):
+    """Seconds are added in the middle of a program, fewer than it lasts: without its lines it is refused, and the jump
     is said.
     """
-    time = np.where(np.arange(len(log.time)) > len(log.time) // 2, log.time + jump, log.time)
-    with pytest.raises(InputError, match=rf"another program.*its clock: 1 gap in time, the first of {said} at"):
+    time = np.where(np.arange(len(log.time)) > len(log.time) // 2, log.time + 40.0, log.time)
+    said = r"another program.*its clock: 1 gap in time, the first of 40\.1 s at .*: log the line of the program"
+    with pytest.raises(InputError, match=said):
         align_log("log", replace(log, time=time), log.power, program)
+
+
+@pytest.mark.parametrize("lines", [False, True])
+def test_a_clock_that_jumps_by_more_than_the_program_lasts(log, program, lines):
+    """As one that becomes seconds since 1970: no sample can be missing for so long, so that it is the same log."""
+    own = align_log("log", log, log.power, program)
+    stated = replace(log, line=np.where(own.row < 0, 0, program.line[own.row]).astype(float)) if lines else log
+    time = np.where(np.arange(len(log.time)) > len(log.time) // 2, log.time + 1e9, log.time)
+    found = align_log("log", replace(stated, time=time), log.power, program)
+    assert [(f.code, "the first of 1e9 s" in f.text) for f in found.findings] == [("log-gap", True)]
+    assert found.correlation > 0.95
+    learned = learn_material([blocks_of(found, program)], SIGNAL, PRIOR)
+    assert learned.material.Ktc == pytest.approx(1.2 * PRIOR.Ktc, rel=3.0 * learned.deviations[1][0])
+
+
+def test_blocks_of_a_clock_that_jumps_are_few(log, program):
+    """A block is as long as without the jump: their number does not grow by it."""
+    aligned = align_log("log", log, log.power, program)
+    late = replace(aligned, time=np.where(np.arange(len(log.time)) > 1000, log.time + 1e7, log.time))
+    few, usual = blocks_of(late, program, {}), blocks_of(aligned, program, {})
+    assert abs(len(few.time) - len(usual.time)) < 10
+
+
+def test_a_sample_far_out_of_range_is_left_out(log, program):
+    """One sample of 1e9 W would be all that the correlation sees."""
+    power = log.power.copy()
+    power[700] = 1e12
+    found = align_log("log", replace(log, power=power), power, program)
+    assert len(found.time) == len(log.time) - 1
+    assert found.correlation > 0.95
+    assert [f.code for f in found.findings] == ["log-spike"]
+    assert f"1 of its samples are left out: the one at {log.time[700]:g} s is" in found.findings[0].text
+
+
+def test_what_is_odd_of_a_log_that_is_refused(log, program):
+    """A quarter of the program, a clock in other units, a wrong sign, some samples: each is said."""
+    some = len(log.time) // 4
+    part = SpindleLog(log.time[:some], power=log.power[:some])
+    for one, text in (
+        (part, r"it lasts 60\.4 s, the program is calculated to last \d+(\.\d+)? s: a part of the program$"),
+        (
+            replace(log, time=1e3 * log.time),
+            r"more than the program, or the unit of its time \(a factor of 0\.000[78]\d\)",
+        ),
+        (replace(log, time=log.time / 60.0), r"a part of the program, or the unit of its time \(a factor of 4\d\)"),
+        (replace(log, power=-log.power), "most of its values are negative: check their sign"),
+        (
+            SpindleLog(log.time[:9], power=log.power[:9]),
+            "log: 9 samples: at least 10 are needed: log the whole program",
+        ),
+    ):
+        with pytest.raises(InputError, match=text):
+            align_log("log", one, one.power, program)
 
 
 @pytest.mark.parametrize("factor", [1e-3, 10.0, 1e3])
@@ -159,6 +212,9 @@ def test_lines_of_another_program(log, program):
         align_log("log", replace(log, line=np.full(len(log.time), 1e6)), log.power, other)
     found = align_log("log", replace(log, line=np.zeros(len(log.time))), log.power, program)
     assert found.correlation > 0.9
+    assert [str(f) for f in found.findings] == [
+        "log: its lines are not those of the program: it is aligned by its load (log-line)"
+    ]
 
 
 def test_missing_stock_is_named(log, program):

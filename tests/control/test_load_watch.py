@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -102,3 +103,37 @@ def test_settings_out_of_range() -> None:
         WatchSettings(false_alarms=0.0)
     with pytest.raises(InputError, match=r"wear = 1: must be above 1\.1"):
         WatchSettings(wear=1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda t, p, line: (t, p, line + 1000), r"100 % of the samples are of a line that the program does not have"),
+        (lambda t, p, line: (1e3 * t, p, line), r"are 100 s apart, at most 0\.25 s is.* unit of the time"),
+        (lambda t, p, line: (t, 1e3 * p, line), "idle load is .* times .*: check the unit of the signal"),
+        (lambda t, p, line: (t[:0], p, line), "no sample was read"),
+        (lambda t, p, line: (t, 2e5 + 1e7 * (-1.0) ** np.arange(len(p)), line), "no cut is well above the noise"),
+    ],
+)  # fmt: skip
+def test_why_nothing_could_be_judged(change, text: str) -> None:
+    """A log of another program, of a clock or a power in other units, an empty one, and one of noise."""
+    one = stream(3)
+    watch = LoadWatch(one.program, SIGNAL, PRIOR)
+    for t, p, line in zip(*change(one.time, one.power, one.line), strict=False):
+        watch.add(float(t), float(p), int(line))
+    assert watch.judged_seconds == 0.0
+    assert re.search(text, watch.why_not_judged)
+
+
+def test_idle_load_that_is_not_known() -> None:
+    """The program cuts from its begin."""
+    rows = np.arange(1.0, 100.0)
+    program = PredictedTorque(
+        0.1 * rows, 800.0 + 0.0 * rows, 900.0 + 0.0 * rows, 300.0 + 0.0 * rows, np.ones(99, int), np.ones(99, int)
+    )
+    watch = LoadWatch(program, SIGNAL, PRIOR)
+    for t in np.arange(0.0, 9.0, 0.1):
+        watch.add(float(t), 1e6, 1)
+    assert watch.why_not_judged == (
+        "the idle load is not known: 1.5 s of air at the speed of the cut are needed before it"
+    )

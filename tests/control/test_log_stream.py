@@ -9,6 +9,8 @@ from pathlib import Path
 from urllib.parse import parse_qs, urlparse
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import chipload.api.mechanics.learning as learning
@@ -52,6 +54,18 @@ def test_a_file_that_grows_is_cut_off_and_replaced(tmp_path: Path) -> None:
     assert found == [
         (0.0, 1e5, 1, 1.0), (0.1, 2e5, 1, 0.5), (0.3, 3e5, 2, 1.0), (5.0, 5e5, 3, 1.0), (9.0, 9e5, 4, 1.0)
     ]  # fmt: skip
+
+
+def test_a_parquet_file_that_is_complete(tmp_path: Path) -> None:
+    """Its rows as they were written; it does not grow."""
+    file = tmp_path / "cut.parquet"
+    pq.write_table(pa.table({"time_s": [0.0, 0.5], "power_w": [100.0, 200.0], "line": [3, 4]}), file)
+    found = [(s.time, s.value, s.line, s.override) for s in follow_file(file, SignalKind.POWER, once=True) if s]
+    assert found == [(0.0, 1e5, 3, 1.0), (0.5, 2e5, 4, 1.0)]
+    with pytest.raises(InputError, match="a Parquet file does not grow: state --once, or write CSV"):
+        next(follow_file(file, SignalKind.POWER))
+    with pytest.raises(InputError, match="no column of torque, which is needed"):
+        next(follow_file(file, SignalKind.TORQUE, once=True))
 
 
 def test_what_a_file_lacks(tmp_path: Path) -> None:

@@ -46,6 +46,17 @@ def test_semicolons_are_named(tmp_path):
         read_log(path)
 
 
+def test_an_empty_file_and_a_number_that_no_instrument_writes(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("")
+    with pytest.raises(InputError, match="the file is empty: log the program"):
+        read_log(path)
+    path.write_text("time_s,power_w\n0,100\n1,1e308\n2,nan\n3,200\n")
+    log, findings = read_log(path)
+    assert log.power.tolist() == [1e5, 2e5]
+    assert [str(f) for f in findings] == ["line 3: 2 rows are left out: a number is missing or above 1e+30 (log-row)"]
+
+
 def test_time_that_does_not_rise(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("t,I\n0,1\n2,1\n1,5\n2,6\n3,1\n")

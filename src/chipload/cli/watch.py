@@ -115,6 +115,8 @@ def watch(
             raise InputError(
                 "--hold, --signal-pin, --override-pin: apply to hal, the pins of a LinuxCNC: leave them out"
             )
+        if source != "hal" and not source.startswith(("http://", "https://")) and not Path(source).is_file():
+            raise InputError(f"log {source}: no such file: start the program that writes it first")
         settings = WatchSettings(false_alarms, 1.0 + wear_percent / 100.0, lag_s=lag_s)
         if spindle is not None and (torque or efficiency is not None or efficiency_error is not None):
             raise InputError("--spindle, --efficiency, --torque: state only one of them")
@@ -192,10 +194,7 @@ def _summary(one: LoadWatch, found: int) -> int:
     whole, cut, judged = (number_text(x, 3) for x in (one.seconds, one.cut_seconds, one.judged_seconds))
     show(f"{whole} s watched, {cut} s of them in the cut, {judged} s judged; {found} alarm{'' if found == 1 else 's'}")
     if one.judged_seconds == 0.0:
-        show(
-            "nothing could be judged: the log needs the idle spindle before the first cut, lines of the program, and "
-            "a cut well above the noise"
-        )
+        show(f"nothing could be judged: {one.why_not_judged}")
     return EXCEEDED if found or one.judged_seconds == 0.0 else 0
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,10 @@ SAMPLES, TRIED = 4096, 71
 SENSOR_LAGS, MOST_SHIFT_S, MOST_SHIFT_SAMPLES = (0.0, 0.03, 0.1, 0.3), 0.3, 2.0
 #: greatest time constant of a sensor that is found [s]
 MOST_LAG_S = 1.0
+#: samples of a log at least
+LEAST_SAMPLES = 10
+#: share of the samples at each end whose range is the usual one, and how often that a sample may be outside of it
+SPIKE_SHARE, SPIKE_RANGES = 0.005, 10.0
 #: a step of time over the usual one, and in seconds, that is a gap
 GAP_STEPS, GAP_S = 10.0, 1.0
 
@@ -162,8 +166,13 @@ def align_log(
     Raises
     ------
     InputError
-        The signal does not follow the program: another program, or no cut.
+        The signal does not follow the program: another program, or no cut; the log has too few samples.
     """
+    if len(log.time) < LEAST_SAMPLES:
+        raise InputError(f"{name}: {len(log.time)} samples: at least {LEAST_SAMPLES} are needed: log the whole program")
+    log, signal, notes = _without_spikes(name, log, signal)
+    notes += _gaps(name, log.time)
+    log = replace(log, time=_without_jumps(log.time, float(predicted.time[-1])))
     start = np.concatenate([[0.0], predicted.time[:-1]])
     load = predicted.cutting + predicted.edge
     if not (load > 0.0).any():
@@ -179,6 +188,9 @@ def align_log(
         clock = np.concatenate([[0.0], np.cumsum(np.diff(log.time) * log.override[1:])])
     lag, rate = 0.0, 1.0
     place = None if log.line is None else _time_by_line(name, log.line, clock, predicted, start)
+    if place is None and log.line is not None:
+        text = f"{name}: its lines are not those of the program: it is aligned by its load"
+        notes.append(Finding("log-line", 0, text, Severity.NOTE))
     if place is None:
         lag, rate = _lag_and_rate(clock, signal, predicted.time, start, load, sensor_lag)
         place = (clock - lag) / rate
@@ -190,13 +202,51 @@ def align_log(
     expected = first_order(np.where(running, load[row], 0.0), log.time, sensor_lag)
     correlation = _correlation(signal, expected)
     if not correlation >= LEAST_CORRELATION:
-        jumps = "".join(f"; {f.text}" for f in _gaps("its clock", log.time))
         raise InputError(
             f"{name}: its signal follows the program with a correlation of {correlation:.2f}, at least "
             f"{LEAST_CORRELATION:g} is needed: it is the log of another program, or the spindle does not feel the cut"
-            f"{jumps}{': log the line of the program, or cut the log there' if jumps and log.line is None else ''}"
+            f"{_what_is_odd(log, clock, signal, float(predicted.time[-1]))}"
         )
-    return AlignedLog(name, log.time, signal, row, lag, rate, correlation, sensor_lag, tuple(_gaps(name, log.time)))
+    return AlignedLog(name, log.time, signal, row, lag, rate, correlation, sensor_lag, tuple(notes))
+
+
+def _what_is_odd(log: SpindleLog, clock: Floats, signal: Floats, seconds: float) -> str:
+    """Return what else a log that does not follow the program of so many seconds has: its clock, its sign."""
+    out = "".join(f"; {f.text}" for f in _gaps("its clock", log.time))
+    if out:
+        return f"{out}{': log the line of the program, or cut the log there' if log.line is None else ''}"
+    longer = float(clock[-1]) / seconds
+    if not RATES[0] <= longer <= MOST_LONGER:
+        unit = f", or the unit of its time (a factor of {1.0 / longer:.2g})" if abs(math.log10(longer)) > 0.9 else ""
+        own, whole = number_text(clock[-1]), number_text(seconds)
+        part = "a part of the program" if longer < 1.0 else "more than the program"
+        out += f"; it lasts {own} s, the program is calculated to last {whole} s: {part}{unit}"
+    if float(np.median(signal)) < 0.0:
+        out += "; most of its values are negative: check their sign"
+    return out
+
+
+def _without_jumps(time: Floats, seconds: float) -> Floats:
+    """Return a clock without steps that are longer than the program of so many seconds: each lasts a usual step."""
+    step = np.diff(time)
+    usual = np.where(step > seconds, np.median(step), step)
+    return np.asarray(time[0] + np.concatenate([[0.0], np.cumsum(usual)]))
+
+
+def _without_spikes(name: str, log: SpindleLog, signal: Floats) -> tuple[SpindleLog, Floats, list[Finding]]:
+    """Return a log without the few samples that are far outside of the range of all others, and a finding of them."""
+    low, high = np.quantile(signal, (SPIKE_SHARE, 1.0 - SPIKE_SHARE), method="nearest")
+    far = SPIKE_RANGES * (high - low)
+    kept = (signal >= low - far) & (signal <= high + far)
+    if far <= 0.0 or kept.all():
+        return log, signal, []
+    worst = int(np.argmax(np.abs(signal - 0.5 * (low + high))))
+    text = (
+        f"{name}: {int((~kept).sum())} of its samples are left out: the one at {number_text(log.time[worst])} s is "
+        f"{number_text((signal[worst] - low) / (high - low), 2)} times the range of all others away"
+    )
+    columns = {key: value[kept] for key, value in vars(log).items() if value is not None}
+    return SpindleLog(**columns), signal[kept], [Finding("log-spike", 0, text, Severity.NOTE)]
 
 
 def _correlation(a: Floats, b: Floats) -> float:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.control.log_alignment import AlignedLog, PredictedTorque
+from chipload.control.log_alignment import GAP_STEPS, AlignedLog, PredictedTorque
 from chipload.control.spindle import first_order
 
 Floats = NDArray[np.float64]
@@ -69,8 +69,10 @@ def blocks_of(
         cut[own] = before.get(int(number), 0.0) + np.cumsum(np.where(load > 0.0, predicted.time - start, 0.0)[own])
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     lag = max(aligned.sensor_lag, SENSOR_LAG_S)
-    length = max((time[-1] - time[0]) / MOST_BLOCKS, LEAST_SAMPLES * step, BLOCK_LAGS * lag)
-    place = ((time - time[0]) / length).astype(np.int64)
+    # a gap lasts a few steps, however far the clock jumps
+    clock = np.concatenate([[0.0], np.cumsum(np.minimum(np.diff(time), GAP_STEPS * step))])
+    length = max(clock[-1] / MOST_BLOCKS, LEAST_SAMPLES * step, BLOCK_LAGS * lag)
+    place = (clock / length).astype(np.int64)
     n = int(place[-1]) + 1
     # before and after the program the speed of the spindle is not known
     speed = np.where(inside, predicted.speed[row], 0.0)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from chipload.control.learning import SignalKind
-from chipload.control.logs import KNOWN, UNITS, LogLayout, log_columns
+from chipload.control.logs import KNOWN, PARQUET, UNITS, LogLayout, log_columns, read_log
 from chipload.errors import InputError
 from chipload.machine.mtconnect_stream import AgentSource, follow_agent
 
@@ -63,7 +63,7 @@ def follow_file(
     once: bool = False,
     wait: Callable[[float], None] = time.sleep,
 ) -> Iterator[LoadSample | None]:
-    """Yield the samples of a CSV file, as it grows; None where there is none now.
+    """Yield the samples of a CSV file, as it grows, or of a Parquet file; None where there is none now.
 
     Parameters
     ----------
@@ -75,15 +75,35 @@ def follow_file(
     Raises
     ------
     InputError
-        There is no such file, or it has no column of the time, the signal or the line.
+        There is no such file, it has no column of the time, the signal or the line, or it is a Parquet file that is
+        waited for.
     """
     if not path.is_file():
         raise InputError(f"log {path}: no such file: start the program that writes it first")
+    with path.open("rb") as file:
+        is_parquet = file.read(len(PARQUET)) == PARQUET
+    if is_parquet:
+        if not once:
+            raise InputError(f"log {path}: a Parquet file does not grow: state --once, or write CSV")
+        yield from _samples_of(path, kind, columns)
+        return
     while True:
         with path.open("rb") as file:
             yield from _rows(path, file, kind, columns, once, wait)
         if once:
             return
+
+
+def _samples_of(path: Path, kind: SignalKind, columns: dict[str, Any] | str | Path | None) -> Iterator[LoadSample]:
+    """Yield the samples of a log that is complete."""
+    log, _ = read_log(path, columns)
+    values = {SignalKind.POWER: log.power, SignalKind.CURRENT: log.current, SignalKind.TORQUE: log.torque}[kind]
+    if values is None or log.line is None:
+        missing = kind.value if values is None else "line"
+        raise InputError(f"log {path}: no column of {missing}, which is needed: log it, or name it with --columns")
+    override = [1.0] * len(log.time) if log.override is None else log.override
+    for at, value, line, share in zip(log.time, values, log.line, override, strict=True):
+        yield LoadSample(float(at), float(value), int(line), float(share))
 
 
 def agent_samples(

@@ -53,6 +53,8 @@ UNITS: dict[str, dict[str, float]] = {
     "line": {"": 1.0},
     "override": {"": 1.0, "%": 1e-2},
 }
+#: a number from here on is none of a measurement
+GREATEST = 1e30
 #: quantities that tell the load
 LOADS = frozenset({"current", "power", "torque"})
 _QUANTITIES = (*UNITS, "label")
@@ -144,7 +146,9 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
     wanted, sample = layout.wanted, layout.sample
     findings = []
     if bad:
-        findings.append(Finding("log-row", bad[0], f"{len(bad)} rows are left out: a number is missing"))
+        findings.append(
+            Finding("log-row", bad[0], f"{len(bad)} rows are left out: a number is missing or above {GREATEST:g}")
+        )
     if not kept:
         raise InputError(f"{label}: no row with all of {', '.join(n for n, _ in wanted.values())}")
     made: dict[str, Any] = {"time": np.array(number, dtype=np.float64) * (sample or 0.0)}
@@ -267,6 +271,8 @@ def _by_name(label: str, names: list[str]) -> _Columns:
         if quantity and quantity not in wanted:
             wanted[quantity] = (name, unit)
     if "time" not in wanted or not LOADS & set(wanted):
+        if not any(names):
+            raise InputError(f"{label}: the file is empty: log the program")
         if len(names) == 1 and ";" in names[0]:
             raise InputError(
                 f"{label}: its columns are separated by semicolons: export it with commas, and a point in its numbers"
@@ -295,7 +301,7 @@ def _complete_rows(rows: Any, places: dict[str, int]) -> tuple[list[list[float |
                 value = float(text)
             except ValueError:
                 break
-            if not math.isfinite(value):
+            if not abs(value) < GREATEST:
                 break
             values.append(value)
         if len(values) == len(places):
