@@ -16,7 +16,7 @@ from chipload.program.gcode.sinumerik_patterns import PATTERNS
 from chipload.program.gcode.sinumerik_pockets import POCKETS
 from chipload.program.gcode.sinumerik_points import POINT_WORDS, POLES
 from chipload.program.gcode.sinumerik_slots import SLOTS
-from chipload.program.gcode.sinumerik_words import CORNERS, CURVES, IDLE, PLACED
+from chipload.program.gcode.sinumerik_words import CONTOUR_FEEDS, CORNER_FEEDS, CORNERS, CURVES, IDLE, PLACED
 from chipload.program.gcode.sinumerik_words import UNREAD as UNREAD_WORDS
 from chipload.program.heidenhain import cycles, q_cycles, switches
 
@@ -219,7 +219,8 @@ def _sinumerik(control: Control) -> list[str]:
         ("pockets, slots and faces, on ways of their own", " ".join((*POCKETS, *SLOTS))),
         ("values", "R[ ], fields, DIV MOD TRUNC ROUND POT ATAN2 MINVAL MAXVAL BOUND, TRUE FALSE, DEFINE AS"),
         ("subprograms", "L100 P3, NAME P2, NAME(1, 2), CALL, EXTCALL: %_N_NAME_SPF or PROC in the text, NAME.SPF"),
-        ("corners", " ".join(CORNERS)),
+        ("corners", " ".join((*CORNERS, *CORNER_FEEDS, "G450 G451"))),
+        ("feed of arcs beside a contour", " ".join(CONTOUR_FEEDS)),
         (
             "jumps and loops",
             " ".join((*(f"{a} {b}" for b, a in CLOSES.items()), "ELSE REPEATB GOTO GOTOB GOTOF GOTOS")),
@@ -227,6 +228,7 @@ def _sinumerik(control: Control) -> list[str]:
     ]
     silent = " ".join(f"G{g}" for g in sorted(NO_MEANING))
     left = [(" ".join(sorted(CURVES)), "the motion of the block is left out")]
+    left += [("KONT", "the way round the contour at its start and end")]
     left += [(name, what) for name, what in sorted(UNREAD_WORDS.items())]
     return [
         "## Words that are read", "", *_table(("what", "words"), rows), "",
@@ -258,7 +260,8 @@ def _heidenhain(control: Control) -> list[str]:
         f"Cycles {' '.join(map(str, sorted(cycles.SILENT)))}; {' '.join(f'M{m}' for m in switches.SILENT)}", "",
         "## Words that are not read", "",
         "What such a cycle cuts is left out: a finding with its line, and the result is unproven.", "",
-        f"Cycles {_ranges(left)}; PLANE PROJECTED and POINTS; contours by FK and by SL cycles.",
+        f"Cycles {_ranges(left)}; PLANE PROJECTED and POINTS; contours by FK and by SL cycles; "
+        "M97, M98, M114 and M130.",
     ]  # fmt: skip
 
 

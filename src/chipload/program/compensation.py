@@ -20,6 +20,8 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 from chipload.errors import InputError
@@ -29,6 +31,8 @@ from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID
 SMOOTH = 0.05
 #: a smaller radius counts as none [mm]
 LEAST_RADIUS = 1e-9
+#: two arcs have one centre within this [mm]
+SAME_CENTRE = 1e-6
 
 
 class CentreMove(NamedTuple):
@@ -43,6 +47,48 @@ class CentreMove(NamedTuple):
     centre: tuple[float, float]
     turns: int
     payload: object
+
+
+class ContourFeed(Enum):
+    """What the feed of an arc beside a contour is of: the tool's centre, the contour, or that at concave arcs."""
+
+    NONE = "centre"
+    ALL = "contour"
+    CONCAVE = "concave"
+
+
+@dataclass(frozen=True)
+class ContourArc:
+    """A programmed arc whose feed is that along the contour: its centre and radius [mm]."""
+
+    rule: ContourFeed
+    centre: tuple[float, float]
+    radius: float
+
+    def feed_share(self, move: CentreMove, plane: int) -> float:
+        """Feed of the tool's centre as a share of the programmed one, 1 for what is no part of the arc.
+
+        F' = F r_c / r with r_c the radius on which the centre goes and r that of the contour.
+
+        Reference: Siemens, SINUMERIK 808D ADVANCED, Programming and Operating Manual (Milling), 01/2014, p. 79;
+        Heidenhain, iTNC 530 User's Manual, "Feed rate for circular arcs: M109/M110/M111".
+
+        >>> arc = ContourArc(ContourFeed.ALL, (0.0, 0.0), 10.0)
+        >>> arc.feed_share(CentreMove(2, (0.0, 15.0) + (0.0,) * 7, (0.0, 0.0), 1, None), 0)
+        1.5
+        """
+        if move.motion != ARC or math.dist(move.centre, self.centre) > SAME_CENTRE:
+            return 1.0
+        first, second, _ = PLANE_AXES[plane]
+        share = math.dist((move.end[first], move.end[second]), move.centre) / self.radius
+        return min(share, 1.0) if self.rule is ContourFeed.CONCAVE else share
+
+
+def contour_arc(rule: ContourFeed, end: Sequence[float], centre: tuple[float, float], plane: int) -> ContourArc | None:
+    """The programmed arc to ``end``; None: its feed is that of the tool's centre."""
+    first, second, _ = PLANE_AXES[plane]
+    radius = math.dist((end[first], end[second]), centre)
+    return None if rule is ContourFeed.NONE or radius <= LEAST_RADIUS else ContourArc(rule, centre, radius)
 
 
 class _Offset(NamedTuple):

@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from chipload.errors import InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, ZX
-from chipload.program.compensation import CentreMove, Compensation
+from chipload.program.compensation import CentreMove, Compensation, ContourArc, ContourFeed, contour_arc
 from chipload.program.control import Control, control_named
 from chipload.program.corners import Corner, Piece, join_corner
 from chipload.program.corners import turns as turns_at
@@ -148,6 +149,13 @@ class Controller:
         self.tap_peck = 0.0
         #: rounds every corner (RNDM of a Sinumerik)
         self.rounding: Corner | None = None
+        #: feed of roundings and chamfers [mm/s]: of that of a line, of all; None: that of the block
+        self._corner_feed: tuple[int, float] | None = None
+        self.corner_feeds: float | None = None
+        #: arcs beside a contour whose feed is that of the contour
+        self.contour_feed = ContourFeed.NONE
+        #: whether outside corners are where the offsets cross; None: as the control does without a word
+        self.crossing_corners: bool | None = None
         self._held: tuple[Piece, int, Corner, bool] | None = None
         self._requested: tuple[int, Corner] | None = None
         #: why motions are left out until further notice; empty: they are not
@@ -372,7 +380,7 @@ class Controller:
             shift=(radius * z, radius * x),
             slack=ARC_SLACK[state.scale != 1.0],
             square=rule.square_entry,
-            sharp=rule.outside_corner == "intersection",
+            sharp=(rule.outside_corner == "intersection") if self.crossing_corners is None else self.crossing_corners,
         )
         state.compensation = code
 
@@ -393,6 +401,13 @@ class Controller:
                 Severity.UNPROVEN,
             )
         return radius
+
+    def _compensate_arc(
+        self, beside: Compensation, end: Nine, centre: tuple[float, float], turns: int, row: tuple[int, int]
+    ) -> None:
+        """Rows beside an arc; ``row``: its context and line."""
+        contour = contour_arc(self.contour_feed, end, centre, PLANES[self.state.plane])
+        self._compensate_rows(beside, lambda b: b.arc(end, centre, turns, (*row, contour)), end)
 
     def _compensate_rows(
         self, beside: Compensation, make: Callable[[Compensation], list[CentreMove]], end: Nine
@@ -433,7 +448,10 @@ class Controller:
     def _emit(self, moves: list[CentreMove]) -> None:
         """Rows of motions beside the contour."""
         for move in moves:
-            context, line = cast(tuple[int, int], move.payload)
+            context, line, contour = cast(tuple[int, int, ContourArc | None], move.payload)
+            if contour is not None:
+                share = contour.feed_share(move, PLANES[self.state.plane])
+                context = self.track.with_feed(context, share * self.track.feed_of(context))
             row = (move.motion, *nine(list(move.end)), context, line)
             if move.motion == ARC:
                 self._arc_row(row, *move.centre, move.turns)
@@ -449,6 +467,10 @@ class Controller:
     def round_all(self, corner: Corner | None) -> None:
         """Round every corner from the motion of the block that is read on; None: no more."""
         self.rounding = corner
+
+    def feed_corner(self, feed: float) -> None:
+        """Feed [mm/s] of the corner after the motion of the block that is read."""
+        self._corner_feed = self.line, feed
 
     @property
     def in_corner(self) -> bool:
@@ -470,10 +492,16 @@ class Controller:
             # a modal rounding rounds what are corners of the contour
             if made is None and (not modal or (motion in (LINE, ARC) and turns_at(before, piece))):
                 self._sharp(line, corner)
+            if made is not None and corner.feed is not None:
+                number = self.track.with_feed(cast(tuple[int, int], made[1].tail)[0], corner.feed)
+                made = made[0], replace(made[1], tail=(number, line)), made[2]
             for some in (before,) if made is None else made[:-1]:
                 self._carry(some)
             piece = piece if made is None else made[-1]
         own = requested[1] if requested is not None else self.rounding
+        if own is not None:
+            once = self._corner_feed
+            own = replace(own, feed=once[1] if once is not None and once[0] == self.line else self.corner_feeds)
         if own is not None and motion in (LINE, ARC):
             self._held = piece, self.line, own, requested is None
         else:
@@ -501,9 +529,9 @@ class Controller:
     def _carry(self, piece: Piece) -> None:
         end, (context, line) = nine(piece.end), cast(tuple[int, int], piece.tail)
         if self._beside is not None and piece.motion == ARC:
-            self._compensate_rows(self._beside, lambda b: b.arc(end, piece.centre, piece.turns, (context, line)), end)
+            self._compensate_arc(self._beside, end, piece.centre, piece.turns, (context, line))
         elif self._beside is not None:
-            self._compensate_rows(self._beside, lambda b: b.line(piece.motion, end, (context, line)), end)
+            self._compensate_rows(self._beside, lambda b: b.line(piece.motion, end, (context, line, None)), end)
         elif piece.motion == ARC:
             self._arc_row((ARC, *end, context, line), *piece.centre, piece.turns)
         else:
@@ -608,7 +636,7 @@ class Controller:
         if self.in_corner:
             self._piece(motion, end, (0.0, 0.0), 0, context)
         elif self._beside is not None:
-            self._compensate_rows(self._beside, lambda b: b.line(motion, end, (context, self.line)), end)
+            self._compensate_rows(self._beside, lambda b: b.line(motion, end, (context, self.line, None)), end)
         else:
             self._row((motion, *end, context, self.line))
         self.state.at = end
@@ -635,7 +663,7 @@ class Controller:
         if self.in_corner:
             self._piece(ARC, end, centre, turns, context)
         elif self._beside is not None:
-            self._compensate_rows(self._beside, lambda b: b.arc(end, centre, turns, (context, self.line)), end)
+            self._compensate_arc(self._beside, end, centre, turns, (context, self.line))
         else:
             self._arc_row((ARC, *end, context, self.line), *centre, turns)
         self.state.at = end
@@ -645,6 +673,6 @@ class Controller:
         self.end_corner()
         context = self.track.context(self.carried(seconds))
         if self._beside is not None:
-            self._emit(self._beside.pause((context, self.line)))
+            self._emit(self._beside.pause((context, self.line, None)))
         else:
             self._row((DWELL, *self.state.at, context, self.line))

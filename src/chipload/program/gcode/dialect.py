@@ -56,6 +56,14 @@ class Dialect:
         """The text as the others write it."""
         return text
 
+    def begins_at(self, lines: list[str]) -> int:
+        """Index of the line before which nothing is read."""
+        return 0
+
+    def blocks_of(self, raw: str, c: Controller) -> list[str]:
+        """The blocks of a line."""
+        return [raw]
+
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line; None where there is nothing to carry out."""
         text, comments = bare(raw)

@@ -64,6 +64,11 @@ _COLON = re.compile(r"^([ \t]*):(?=[0-9]+[ \t]*(?:\(|$))", re.MULTILINE)
 _PLACE = re.compile(r"^([ \t]*):(?=[0-9])", re.MULTILINE)
 _FILE = re.compile(r"^\$[^\n%]*%[ \t]*$", re.MULTILINE)
 _SKIP = re.compile(r"^/[1-9]")
+#: how the words of a block begin; a block of words with numbers, one of them a code or an axis
+_BEGINS = re.compile(r"\s*[/:]?\s*(?:[A-Za-z]\s*[-+]?[0-9.#\[]|#|IF|WHILE|GOTO)")
+_COMMENT = re.compile(r"\([^()\n]*\)")
+_WORD = r"[A-Za-z][-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+|#[0-9]+|\[[^\[\]]*(?:\[[^\[\]]*\][^\[\]]*)*\])"
+_BLOCK = re.compile(rf"(?=.*[GMXYZgmxyz])/?(?:{_WORD})+")
 _TAP = re.compile(r"g(?:84|74)(?![0-9.])")
 #: rounding or chamfer of the corner behind a motion, and an angle or what else stands behind a comma
 _CORNER = re.compile(r",([rc])([-+]?[0-9.]+|#[0-9]+|\[[^\]]*\])")
@@ -139,6 +144,27 @@ class Fanuc(Dialect):
         """System variables, and numbers without a decimal point."""
         c.parameters.live.update(system_variables(c))
         decide_increments(c, text)
+
+    def begins_at(self, lines: list[str]) -> int:
+        """Index of the first % behind a text without words: what stands before it is a label that is not read."""
+        first = next((k for k, line in enumerate(lines) if line.strip() == "%"), 0)
+        follows = any(line.strip() for line in lines[first + 1 :])
+        return first if follows and not any(_BEGINS.match(line) for line in lines[:first]) else 0
+
+    def blocks_of(self, raw: str, c: Controller) -> list[str]:
+        """The blocks of a line: ; is how manuals and screens write the end of a block."""
+        if ";" not in raw:
+            return [raw]
+        parts = _COMMENT.sub(lambda found: found[0].replace(";", ","), raw).split(";")
+        blocks = [part for part in parts if _BLOCK.fullmatch("".join(_COMMENT.sub("", part).split()))]
+        behind = next((part for part in parts[1:] if part in blocks), None)
+        if behind is None:
+            return [raw]
+        c.leave_out(
+            "nc-end-of-block",
+            f"{behind.strip()[:60]!r}: stands behind ; and is carried out as a block: put a comment in ( )",
+        )
+        return blocks
 
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line, in LinuxCNC's words."""

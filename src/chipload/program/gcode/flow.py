@@ -24,6 +24,7 @@ from chipload.program.gcode.plain import run_plain
 from chipload.program.gcode.sinumerik_calls import call_program
 from chipload.program.gcode.source import KEYWORDS, OWord, Source, read_source
 from chipload.program.gcode.track import BoundError
+from chipload.program.gcode.unreached import note_unreached
 from chipload.program.gcode.words import Block, MacroCall, bare
 
 #: calls within calls
@@ -85,10 +86,13 @@ class Flow:
         self._loops: dict[int, int] = {}
         self._files: dict[str, Source | None] = {}
         self._opened = False
+        #: whether each line of the main text has been carried out
+        self._reached = bytearray(len(source.lines))
 
     def run(self) -> None:
         """Carry out blocks until the program ends."""
         try:
+            self.line = self.dialect.begins_at(self.main.lines)
             self._opened = self._percent()
             report = 0
             while self._step_or_finding():
@@ -96,6 +100,8 @@ class Flow:
                     report = self.blocks
                     self.c.track.spill()
                     self.progress(min(1.0, self.line / max(1, len(self.main.lines))), "reading")
+            if self.lenient:
+                note_unreached(self.c, self.main.lines, self._reached, self.line if self.source is self.main else None)
         except InputError as error:
             raise InputError(f"{self.source.name}: line {self.line + 1}: {error}") from None
 
@@ -114,9 +120,14 @@ class Flow:
             self.line += 1
             return not used_up and self.line <= len(self.source.lines)
 
+    def _reach(self, begin: int, end: int) -> None:
+        """Note that lines of the main text are carried out."""
+        if self.source is self.main:
+            self._reached[begin:end] = b"\1" * (end - begin)
+
     def _percent(self) -> bool:
-        for line, text in enumerate(self.main.lines):
-            text = text.strip()
+        for line in range(self.line, len(self.main.lines)):
+            text = self.main.lines[line].strip()
             if text:
                 if text == "%":
                     self.line = line + 1
@@ -130,8 +141,10 @@ class Flow:
         if self.line >= len(lines):
             return self._end()
         if self.dialect.plain:
-            self.line, done = run_plain(self.c, self.i.motion, lines, self.line)
+            begin = self.line
+            self.line, done = run_plain(self.c, self.i.motion, lines, begin)
             self.blocks += done
+            self._reach(begin, self.line)
             if self.line >= len(lines):
                 return self._end()
         self.blocks += 1
@@ -139,6 +152,7 @@ class Flow:
             raise BoundError(f"more than {self.most_blocks} blocks: a loop does not end, or most_blocks must be raised")
         raw = lines[self.line]
         self.c.line = self.line + 1
+        self._reach(self.line, self.line + 1)
         word = self.source.words.get(self.line)
         if word is not None:
             self._check_length(raw)
@@ -155,7 +169,20 @@ class Flow:
             self.i.finish()
             return False
         self._check_length(raw)
-        return self._block(raw)
+        return self._line(raw)
+
+    def _line(self, raw: str) -> bool:
+        """Carry out the blocks of a line; whether there are more."""
+        source, line = self.source, self.line
+        *first, last = self.dialect.blocks_of(raw, self.c)
+        for block in first:
+            if not self._block(block):
+                return False
+            if self.source is not source or self.line != line + 1:
+                self.c.leave_out("nc-end-of-block", f"{last.strip()[:60]!r}: stands behind a jump or a call: left out")
+                return True
+            self.line = line
+        return self._block(last)
 
     def _lone_percent(self) -> None:
         """A % that ends a text without one at its beginning.

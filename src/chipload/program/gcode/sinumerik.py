@@ -42,6 +42,8 @@ from chipload.program.gcode.sinumerik_swivel import swivel
 from chipload.program.gcode.sinumerik_values import define, element, value_of, without_blanks
 from chipload.program.gcode.sinumerik_words import (
     ALONG_TOOL,
+    CONTOUR_FEEDS,
+    CORNER_FEEDS,
     CORNERS,
     CURVES,
     END_ALONG_TOOL,
@@ -82,7 +84,7 @@ _DEFINITION = re.compile(r"DEF\s+(?:CHAN\s+|NCK\s+)?(REAL|INT|BOOL|CHAR|STRING|A
 SAME = {60: 610, 64: 640, 641: 640, 642: 640, 643: 640, 644: 640, 645: 640, 70: 200, 700: 200, 71: 210, 710: 210,
         153: 530, 53: 530, 9: 0}  # fmt: skip
 PLAIN = frozenset({0, 1, 2, 3, 4, 17, 18, 19, 40, 41, 42, 54, 55, 56, 57, 90, 91, 93, 94, 95, 96, 97})
-NO_MEANING = frozenset({9, 25, 26, 450, 451, 460, 461, 462, 601, 602, 603, 621, 810, 820, 930, 931, 94})
+NO_MEANING = frozenset({9, 25, 26, 460, 461, 462, 601, 602, 603, 621, 810, 820, 930, 931, 94})
 #: shifts by G code
 FRAME_CODES = {58: "TRANS", 59: "ATRANS"}
 #: G33 and tapping: LinuxCNC's code, and whether the spindle turns against K
@@ -276,6 +278,10 @@ def _code(block: Block, c: Controller, code: int) -> None:
         block.g.append(10 * code)
     elif code == 500 or 505 <= code <= 599:
         choose(c, f"G{code}", 0 if code == 500 else code - 500)
+    elif code in (450, 451):
+        if c.state.compensation != 400:
+            c.leave_out("nc-unknown-word", f"G{code}: within a compensated contour: its corners stay as they were")
+        c.crossing_corners = code == 451
     elif code in NO_MEANING:
         c.once("nc-ignored", f"G{code}: does not affect the path")
     elif code in SYNCHRONISED:
@@ -354,6 +360,9 @@ def _set_named(block: Block, c: Controller, name: str, text: str, values: list[t
     if name in CORNERS:
         _corner(c, name, text)
         return
+    if name in CORNER_FEEDS:
+        _feed_corner(c, name, value_of(text, c))
+        return
     if left_out := unread(name, text):
         c.leave_out("nc-unknown-word", left_out)
         if leaves_out(name) and NOTED not in block.g:
@@ -401,6 +410,17 @@ def _corner(c: Controller, name: str, text: str) -> None:
         c.round_all(corner)
     elif corner is not None:
         c.round_off(corner)
+
+
+def _feed_corner(c: Controller, name: str, value: float) -> None:
+    """FRC and FRCM: the feed of roundings and chamfers, for each turn in G95; FRCM=0 ends it."""
+    if value < 0.0 or (value == 0.0 and name == "FRC"):
+        raise InputError(f"{name}={value:g}: must be above 0")
+    feed = value * c.state.scale / 60.0 * (abs(c.state.speed) if c.state.feed_mode == 950 else 1.0)
+    if name == "FRCM":
+        c.corner_feeds = feed if feed > 0.0 else None
+    else:
+        c.feed_corner(feed)
 
 
 def _left_out(block: Block, c: Controller, word: str) -> None:
@@ -494,6 +514,10 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
     elif word in JUMPS:
         # sinumerik_flow reads the jumps that begin a block
         raise NotReadError(f"{word}: is not read here")
+    elif word == "KONT":
+        c.leave_out("nc-unknown-word", "KONT: the way round the contour at its start and end is left out")
+    elif word in CONTOUR_FEEDS:
+        c.contour_feed = CONTOUR_FEEDS[word]
     elif word in CURVES or _CYCLE.match(word):
         _left_out(block, c, word)
     elif word in IDLE:

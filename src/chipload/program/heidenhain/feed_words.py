@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from chipload.errors import InputError
 from chipload.program.gcode.feed_words import written_feed
 from chipload.program.heidenhain.din_iso import is_din_iso
-from chipload.program.heidenhain.words import FEED, M_CODE, TURN_FEED
+from chipload.program.heidenhain.words import FEED, M_CODE, PLUNGING, TURN_FEED
 
 #: comments and texts, in which no word stands
 _COMMENTS = re.compile(r";.*|\"[^\"]*\"?")
@@ -131,6 +131,7 @@ def _feed_word(block: str, number: int) -> tuple[int, int, bool] | None:
     """Return where the number of the feed of a block begins and ends, and whether it is for each turn; None: no F."""
     if (added := _ADDED.search(block)) is not None:
         raise InputError(f"line {number}: {added[0].strip()}: is no feed of a cut: write M128 in a block of its own")
+    block = PLUNGING.sub(lambda hit: " " * len(hit[0]), block)
     turned = TURN_FEED.search(block)
     found = turned or FEED.search(block)
     if found is None or found[1] == "MAX":

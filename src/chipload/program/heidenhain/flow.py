@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from chipload.errors import InputError
@@ -22,6 +23,8 @@ LARGEST_FILE, MOST_FILES = 50_000_000, 1000
 _GOTO = re.compile(
     r'IF\s*(.+?)\s+(EQU|NE|GT|LT)\s*(.+?)\s+GOTO LBL\s*(\d+|"[^"]*"|Q[LR]?\d+)\s*$'
 )  # fmt: skip
+#: motions
+_MOVES = re.compile(r"(?:L|LN|LP|C|CR|CT|CP|CTP|APPR|DEP)\s.*[-+]?[0-9]")
 _TESTS = ("EQU", "NE", "GT", "LT")
 #: functions of two values: root of the sum of squares, angle of two sides [deg]
 _PAIRS: dict[int, tuple[str, Callable[[float, float], float]]] = {
@@ -47,6 +50,23 @@ def text_of(raw: str) -> Text:
         if found and found[1] != "0":
             places.setdefault(found[1].lstrip("0") or "0", k)
     return Text(blocks, places)
+
+
+def sections_behind(text: Text, reached: bytearray, end: int) -> Iterator[tuple[int, int, bool]]:
+    """First and last line, from 1, of motions behind the end of a program that nothing carries out, and whether they
+    are a subprogram: a section that begins with a label.
+
+    Parameters
+    ----------
+    reached : whether each block has been carried out
+    end : index of the last block of the program
+    """
+    begins = [k for k in range(end + 1, len(text.blocks)) if re.match(r"LBL|BEGIN PGM", text.blocks[k])]
+    for first, last in pairwise([end + 1, *begins, len(text.blocks)]):
+        moves = [k + 1 for k in range(first, last) if _MOVES.match(text.blocks[k])]
+        if moves and not any(reached[first:last]):
+            label = re.match(r"LBL\s*(?!0\s*$)", text.blocks[first])
+            yield moves[0], moves[-1], label is not None
 
 
 class HeidenhainFlow:
@@ -92,6 +112,12 @@ class HeidenhainFlow:
         if found[2] is None:
             self._enter(self.text, at)
             return place + 1
+        if place > at:
+            self.s.unproven(
+                "heidenhain-repeat",
+                f"{block[:60]}: the label stands on line {place + 1}, behind the call: REP repeats what stands between "
+                "a label and its call: what follows the label is read once",
+            )
         key = (id(self.text), at)
         left = self.repeats.get(key, round(self.s.amount(found[2])))
         self.repeats[key] = left - 1

@@ -32,7 +32,7 @@ from chipload.program.commands import Commands, commands_from_rows
 from chipload.program.heidenhain import motions, switches, words
 from chipload.program.heidenhain.cycles import Cycles, call_positions
 from chipload.program.heidenhain.din_iso import AND, conversational
-from chipload.program.heidenhain.flow import HeidenhainFlow, text_of
+from chipload.program.heidenhain.flow import HeidenhainFlow, Text, sections_behind, text_of
 from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.q_cycles import MAX
 from chipload.program.heidenhain.state import KEPT, ConversationalState
@@ -150,7 +150,8 @@ class _Blocks:
 
     def go(self) -> None:
         """Carry out blocks until the program ends."""
-        at = 0
+        at, main = 0, self.flow.text
+        reached = bytearray(len(main.blocks))
         for _ in range(MOST_BLOCKS):
             blocks = self.flow.text.blocks
             if at >= len(blocks):
@@ -162,10 +163,28 @@ class _Blocks:
                 continue
             if not self.flow.calls or self.flow.calls[0][0] is self.flow.text:
                 self.s.line = at + 1
-            at = self._next(blocks[at], at)
+            if self.flow.text is main:
+                reached[at] = 1
+            last, at = at, self._next(blocks[at], at)
             if self.s.ended:
+                if self.flow.text is main:
+                    self._note_behind(main, reached, last)
                 return
         raise InputError(f"more than {MOST_BLOCKS} blocks are carried out: the program does not seem to end")
+
+    def _note_behind(self, main: Text, reached: bytearray, end: int) -> None:
+        """Report motions behind the end that nothing carries out."""
+        for first, last, called in sections_behind(main, reached, end):
+            self.s.line = first
+            place = f"lines {first} to {last}" if last > first else f"line {first}"
+            if called:
+                self.s.note("nc-not-called", f"{place}: a subprogram that nothing calls: it is not carried out")
+            else:
+                self.s.unproven(
+                    "nc-behind-end",
+                    f"{place}: what stands behind the end of the program is not carried out: give another program a "
+                    "file of its own",
+                )
 
     def _next(self, block: str, at: int) -> int:
         """Carry out a block; returns the next one's index."""

@@ -13,10 +13,21 @@ from typing import Protocol, cast
 
 from chipload.errors import Finding, InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, Frame, Row
-from chipload.program.compensation import CentreMove, Compensation
+from chipload.program.compensation import CentreMove, Compensation, ContourArc, ContourFeed, contour_arc
 from chipload.program.corners import Corner, Piece, join_corner
 from chipload.program.heidenhain.formula import NotKnownError, QParameters, q_number
-from chipload.program.heidenhain.words import AXIS, FEED, RETRACT, SETTINGS, TURN_FEED, feed_unit, number, rest_of
+from chipload.program.heidenhain.words import (
+    AXIS,
+    FEED,
+    FEED_UNIT,
+    PLUNGING,
+    RETRACT,
+    SETTINGS,
+    TURN_FEED,
+    feed_unit,
+    number,
+    rest_of,
+)
 from chipload.program.swivel import Swivel
 from chipload.program.tilt import Tilt
 from chipload.units import mm_s_from_mm_min
@@ -81,6 +92,10 @@ class ConversationalState:
         #: feed of the last TOOL CALL, which F AUTO takes [mm/s]; None: it states none
         self.called_feed: float | None = None
         self.feed_of_turn = False
+        #: arcs beside a contour whose feed is that of the contour
+        self.contour_feed = ContourFeed.NONE
+        #: largest feed down the tool's axis as a share of F (M103); None: none
+        self.plunging_share: float | None = None
         self.speed, self.sense = 0.0, 0.0
         self.tool, self.lengths = 0, dict[int, float]()
         self.radii, self.stated_radii, self.extra_radius = dict(radii), dict[int, float](), 0.0
@@ -159,6 +174,7 @@ class ConversationalState:
 
     def feed_of(self, text: str) -> bool:
         """Take the feed of a block; whether it goes at rapid."""
+        text = self.rules_of_feed(text)
         turned = TURN_FEED.search(text)
         if turned is not None:
             self._take(self.amount(turned[1]), True)
@@ -174,6 +190,17 @@ class ConversationalState:
         elif found is not None and found[1] != "MAX":
             self._take(self.amount(found[1]), False)
         return found is not None and found[1] == "MAX"
+
+    def rules_of_feed(self, text: str) -> str:
+        """Take M136 and M137, the unit of F, and M103 F, the share of it that plunges have; the rest of the text."""
+        for found in FEED_UNIT.finditer(text):
+            self.feed_of_turn, self.feed = found[1] == "136", None
+        for found in PLUNGING.finditer(text):
+            percent = None if found[1] is None else self.amount(found[1])
+            if percent is not None and not 0.0 < percent <= 100.0:
+                raise InputError(f"M103 F{percent:g}: must be above 0 and at most 100 percent")
+            self.plunging_share = None if percent is None else 0.01 * percent
+        return PLUNGING.sub("", text)
 
     def _take(self, value: float, of_turn: bool) -> None:
         value *= self.scale if of_turn or self.feed_of_turn else feed_unit(self.scale)
@@ -239,7 +266,9 @@ class ConversationalState:
 
     def _emit(self, moves: list[CentreMove]) -> None:
         for m in moves:
-            head, tail = cast("tuple[float, tuple[object, ...]]", m.payload)
+            head, tail, contour = cast("tuple[float, tuple[object, ...], ContourArc | None]", m.payload)
+            if contour is not None:
+                head *= contour.feed_share(m, XY)
             self.rows.append((m.motion, tuple(m.end), XY, m.centre, m.turns, head, *tail))
 
     def straight(self, motion: int, end: list[float]) -> None:
@@ -248,6 +277,9 @@ class ConversationalState:
         if feed > 0.0 and end[:3] == self.at[:3] and end[3:] != self.at[3:]:
             # rotary axes alone turn at F degrees a minute, in inches too
             feed /= feed_unit(self.scale)
+        if feed > 0.0 and self.plunging_share is not None and end[2] < self.at[2]:
+            # F down the tool's axis is at most its share
+            feed = min(feed, self.plunging_share * feed * math.dist(end[:3], self.at[:3]) / (self.at[2] - end[2]))
         self._turn_to(complex(end[0] - self.at[0], end[1] - self.at[1]))
         self._piece(Piece(motion, self.at, end, (0.0, 0.0), 0, feed, self.tail()))
         self.at = end
@@ -324,9 +356,10 @@ class ConversationalState:
         if self._beside is None:
             self._row(piece.motion, piece.end, piece.feed, piece.centre, piece.turns, piece.tail)
         elif piece.motion == ARC:
-            self._emit(self._beside.arc(piece.end, piece.centre, piece.turns, (piece.feed, piece.tail)))
+            payload = piece.feed, piece.tail, contour_arc(self.contour_feed, piece.end, piece.centre, XY)
+            self._emit(self._beside.arc(piece.end, piece.centre, piece.turns, payload))
         else:
-            self._emit(self._beside.line(piece.motion, piece.end, (piece.feed, piece.tail)))
+            self._emit(self._beside.line(piece.motion, piece.end, (piece.feed, piece.tail, None)))
 
     def _turn_to(self, along: complex) -> None:
         if abs(along) > 1e-9:
@@ -336,7 +369,7 @@ class ConversationalState:
         """DWELL where the tool stands."""
         self._flush()
         if self._beside is not None:
-            self._emit(self._beside.pause((seconds, self.tail())))
+            self._emit(self._beside.pause((seconds, self.tail(), None)))
         else:
             self._row(DWELL, self.at, seconds, (0.0, 0.0), 0, self.tail())
 

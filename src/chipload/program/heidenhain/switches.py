@@ -9,6 +9,7 @@ import math
 import re
 
 from chipload.errors import InputError
+from chipload.program.compensation import ContourFeed
 from chipload.program.heidenhain import tilted_plane, words
 from chipload.program.heidenhain.state import AXES, RADIUS_Q, ConversationalState
 from chipload.program.setup import FIRST_NAMED
@@ -17,10 +18,13 @@ from chipload.units import MM_PER, rad_s_from_rpm
 
 TOOL_DIGITS = 9
 #: M functions that are carried out, or that do not concern the path
-KNOWN = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 13, 14, 19, 30, 89, 91, 92, 99, 128, 129, 136, 137, 140)
-#: rotary axes by the shortest way, look-ahead, feeds on arcs and plunges, filters, handwheels, limits of axes
-SILENT = (90, 94, 101, 102, 103, 107, 108, 109, 110, 111, 114, 116, 117, 118, 120, 124, 126, 127, 134, 135, 138, 141,
+KNOWN = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 13, 14, 19, 30, 89, 91, 92, 99, 103, 109, 110, 111, 128, 129, 136,
+         137, 140)  # fmt: skip
+#: rotary axes by the shortest way, look-ahead, filters, handwheels, limits of axes
+SILENT = (90, 94, 101, 102, 107, 108, 116, 117, 118, 120, 124, 126, 127, 134, 135, 138, 141,
           142, 143, 148, 149, 150, 200, 201, 202, 203, 204)  # fmt: skip
+#: what the feed of a compensated arc is of
+CONTOUR_FEEDS = {109: ContourFeed.ALL, 110: ContourFeed.CONCAVE, 111: ContourFeed.NONE}
 _SHIFT = re.compile(r"^(I?)([XYZABC])\s*(.+)$")
 _CHANGE = re.compile(rf"\b(D[LR])\s*([-+]?)\s*({words.VALUE})")
 
@@ -32,6 +36,7 @@ def m_codes(text: str) -> list[int]:
 
 def functions(s: ConversationalState, text: str) -> None:
     """A block of M functions alone."""
+    s.rules_of_feed(text)
     codes = m_codes(text)
     act_before(s, codes)
     act_after(s, codes)
@@ -46,9 +51,8 @@ def act_before(s: ConversationalState, codes: list[int]) -> None:
             s.sense = -1.0
         elif m in (128, 129):
             tip(s, m == 128, f"M{m}")
-        elif m in (136, 137):
-            s.feed_of_turn = m == 136
-            s.feed = None
+        elif m in CONTOUR_FEEDS:
+            s.contour_feed = CONTOUR_FEEDS[m]
         if m in (7, 8, 9, 13, 14):
             word = 9 if m == 9 else 8
             s.note("nc-coolant", f"M{word}: coolant does not affect the path; it is ignored")
@@ -65,6 +69,8 @@ def act_after(s: ConversationalState, codes: list[int]) -> None:
             s.ended = True
         elif m in (97, 98):
             s.unproven("heidenhain-corner", f"M{m}: is ignored at a corner of a compensated contour")
+        elif m == 114:
+            s.unproven("heidenhain-m114", "M114: what the control adds to the path of a turning axis is left out")
         elif m == 130:
             s.unproven("heidenhain-m130", "M130: untilted coordinates are read as the current ones")
         elif m not in KNOWN and m not in SILENT:

@@ -16,6 +16,10 @@ FEED = re.compile(rf"\bF\s*(MAX|AUTO|\+?\s*(?:{VALUE}))")
 #: feed for each turn of the spindle
 TURN_FEED = re.compile(rf"\bFU\s*({VALUE})")
 M_CODE = re.compile(r"\bM\s*(\d+)\b")
+#: unit of F: for each turn (M136), for each minute (M137)
+FEED_UNIT = re.compile(r"\bM\s*(136|137)\b")
+#: feed of plunges in percent of F (M103 F); without a number they have F
+PLUNGING = re.compile(rf"\bM\s*103\b(?:\s*F\s*({VALUE}))?")
 SIDE = re.compile(r"\bR([LR0])(?![\d.A-Z])")
 TURN = re.compile(r"\bDR([-+])")
 RADIUS = re.compile(rf"\bR(?!0(?![\d.]))\s*([-+]?)\s*({VALUE})")
