@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from dataclasses import replace
 
@@ -161,6 +162,15 @@ def test_the_command(tmp_path, predicted) -> None:
         code, _, err = call("learn-wall", path, "--out", out)
         assert code == 2
         assert message in err
+    whole = walls_text(predicted[1], 0.02, 0.5)
+    for pattern, list_of, message in (
+        (r"height_mm = \[[^]]*\]", "height_mm = []", "height_mm: has no entry: state at least one\n"),
+        (r"height_mm = \[[^]]*\]", "height_mm = [1.0]", "height_mm has 1 values, error_um "),
+        (r"height_mm = \[[^,]*,", "height_mm = [110.0,", "height_mm = 110: must be from 0 to axial_depth_mm = "),
+    ):
+        path.write_text(re.sub(pattern, list_of, whole, count=1))
+        code, _, err = call("learn-wall", path, "--out", out)
+        assert (code, message in err) == (2, True), err
     # values that no wall has, and walls that no material explains
     waves = [e + 6.0 * np.cos(np.pi * np.arange(len(e))) for e in predicted[1]]
     strange = [share * e for share, e in zip((2.0, 0.4, 1.0), predicted[1], strict=True)]

@@ -66,6 +66,15 @@ def test_what_is_no_receptance_of_a_tip_is_refused(h, text):
         fit_modes(Receptance(F, h), (50.0, 2400.0))
 
 
+def test_a_sensor_that_is_off_and_frequencies_in_khz_are_refused():
+    with pytest.raises(InputError, match="every value is 0: check the channel of the sensor"):
+        fit_modes(Receptance(F, np.zeros(len(F), dtype=complex)), (50.0, 2400.0))
+    with pytest.raises(
+        InputError, match=r"the mode at 0\.42 Hz: must be at least 5 Hz: check the unit of the frequency"
+    ):
+        fit_modes(Receptance(1e-3 * F, receptance()), (0.05, 2.4))
+
+
 def test_a_mode_that_was_not_measured_coherently_is_refused():
     coherence = np.ones(len(F))
     assert fit_modes(Receptance(F, receptance()), (50.0, 2400.0), coherence).coherence.tolist() == [1.0] * 3

@@ -74,7 +74,8 @@ class MeasuredWall:
     def __post_init__(self) -> None:
         """Refuse columns of unlike length, and deviations out of range."""
         if self.height_mm.shape != self.error_um.shape or self.error_um.ndim != 1 or not len(self.error_um):
-            raise InputError(f"{self.name}: height_mm, error_um: must be lists of one length, of one value or more")
+            count = f"height_mm has {self.height_mm.size} values, error_um {self.error_um.size}"
+            raise InputError(f"{self.name}: {count}: must be lists of one length, of one value or more")
         if not np.isfinite(self.error_um).all():
             raise InputError(f"{self.name}: error_um: must be finite numbers")
         if not 0.0 < self.noise_um < math.inf:

@@ -128,7 +128,7 @@ def _line(e: Any, root: type[BaseModel], foreign: Collection[str] = ()) -> str:
     if kind in ("value_error", "assertion_error"):
         return f"{key} = {value}: {context['error']}{_key_meaning(loc, root)}"
     if kind == "too_short":
-        return f"{key}: has no entry: state at least one [[{key}]]"
+        return f"{key}: has no entry: state at least one{f' [[{key}]]' if keys_at(loc, root) else ''}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{key} = {value}: must be a table, [{key}]"
     words = {

@@ -112,7 +112,11 @@ def _wall_of(label: str, table: MeasuredWallTable, cutter: Cutter) -> MeasuredWa
     chips = chips_of_teeth(engagement, cutter)
     height = np.array(table.height_mm)
     if not ((height >= 0.0) & (height <= table.axial_depth_mm)).all():
-        raise InputError(f"{label}: height_mm: must be from 0 to axial_depth_mm = {table.axial_depth_mm:g}")
+        wrong = height[(height < 0.0) | (height > table.axial_depth_mm)][0]
+        raise InputError(
+            f"{label}: height_mm = {wrong:g}: must be from 0 to axial_depth_mm = {table.axial_depth_mm:g}, above the "
+            "tip of the cutter"
+        )
 
     def predict(material: Material) -> NDArray[np.float64]:
         profile = wall_profile(

@@ -30,6 +30,8 @@ LEFT = 0.05
 QUANTILE = 0.99
 #: plausible range of the modal stiffness of a tool's tip [N/mm], and of damping ratios
 STIFFNESS, DAMPING = (100.0, 1e6), (5e-4, 0.3)
+#: least plausible frequency of such a mode [Hz]; machines on their feet are above it
+LEAST_HZ = 5.0
 #: least coherence near the frequency of a mode
 COHERENT = 0.8
 
@@ -84,6 +86,8 @@ def fit_modes(measured: Receptance, band: tuple[float, float], coherence: Array 
     if len(f) < 20:
         raise InputError(f"receptance: {len(f)} frequencies from {band[0]:g} to {band[1]:g} Hz: must be at least 20")
     peak = float(np.abs(H).max())
+    if peak == 0.0:
+        raise InputError("receptance: every value is 0: check the channel of the sensor")
     start: list[float] = []
     best, rest, left = np.zeros(0), H, np.inf
     while len(start) < 2 * MOST_MODES:
@@ -133,6 +137,10 @@ def _check(frequency: Array, damping: Array, modal: Array, band: tuple[float, fl
             )
         if not band[0] < f < band[1]:
             raise InputError(f"receptance: a mode at {f:.5g} Hz: must lie within {band[0]:g} to {band[1]:g} Hz")
+        if f < LEAST_HZ:
+            raise InputError(
+                f"receptance: the mode at {f:.3g} Hz: must be at least {LEAST_HZ:g} Hz: check the unit of the frequency"
+            )
         if not DAMPING[0] <= z <= DAMPING[1]:
             raise InputError(
                 f"receptance: the mode at {f:.5g} Hz has the damping ratio {z:.3g}: must be from {DAMPING[0]:g} to "
