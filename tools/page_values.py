@@ -309,7 +309,12 @@ def frame_pockets(run: Run) -> Text:
     """The programs of the frame."""
     made = run.summary["operations"]
     times = [one["strategies"]["pocket"] for one in made]
+    levels = re.match(r"levels of (.*) mm, with (.*) um of", made[1]["findings"][0])
+    assert levels is not None
+    planned = [float(x) for x in re.findall(r"[\d.]+", levels[2])]
     return {
+        "levels_mm": "+".join(re.findall(r"[\d.]+", levels[1])),
+        "planned_um": f"{max(planned):g}",
         "rough_s": f"{times[0]['time_s']:.1f}",
         "finish_s": f"{times[1]['time_s']:.1f}",
         "engagement_deg": f"{run.worst('engagement_deg'):.1f}",

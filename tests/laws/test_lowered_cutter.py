@@ -27,7 +27,7 @@ def test_any_engagement_up_to_that_ahead_agrees_where_the_cutter_is_lowered(end,
     assert motions.kind[samples.motion[LOWERED]] == LIFT
     engagement = np.degrees(met.angle)
     assert engagement[LOWERED] == 0.0
-    program = Program.join(programs_of(motions, ASKED.feed, ASKED.axial_depth, ASKED.spindle_speed, 1))
+    program = Program.join(programs_of(motions, ASKED.feed, ASKED.spindle_speed, 1))
     for planned, verdict in ((0.0, "proved"), (engaged_deg, "proved"), (engaged_deg + 1.0, "failed")):
         engagement[LOWERED] = planned
         history = {

@@ -32,7 +32,7 @@ def path(x, y, kind):
 
 def programs(run, asked=ASKED):
     motions = motions_of(run, asked.heights, asked.feed, asked.link_feed)
-    return motions, programs_of(motions, asked.feed, asked.axial_depth, asked.spindle_speed, 1)
+    return motions, programs_of(motions, asked.feed, asked.spindle_speed, 1)
 
 
 @pytest.mark.parametrize(

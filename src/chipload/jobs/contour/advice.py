@@ -61,7 +61,7 @@ def greatest_engagement(
         Not even the least engagement that the planner takes holds.
     """
     depth = op.axial_depth_mm
-    if op.depth_mm is not None:
+    if op.depth_mm is not None and op.levels_mm is None:
         depth = op.depth_mm / math.ceil(op.depth_mm / op.axial_depth_mm - 1e-9)
     cut = CutConditions(cutter, material, depth, rad_s_from_rpm(op.speed_rpm), op.milling, *rigid)
     feed = mm_s_from_mm_min(op.feed_mm_min)

@@ -137,6 +137,7 @@ def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int,
             f"{at}.entry = 'ramp': trochoidal passes begin at a bore: state helix, or leave trochoidal out of "
             f"{at}.strategies"
         )
+    yield from _wrong_levels(at, op, table, cutters)
     if op.rest_of is None:
         return
     if op.rest_of >= k or table.operation[op.rest_of].kind != "pocket":
@@ -160,6 +161,35 @@ def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int,
             f"{at}.rest_of = {op.rest_of}: its cutter of {larger.diameter:g} mm leaves nothing for this one of "
             f"{own.diameter:g} mm: state a smaller cutter, or less allowance_mm than its {left:g}"
         )
+
+
+def _wrong_levels(at: str, op: OperationTable, table: ContourJobTable, cutters: Mapping[int, Cutter]) -> Iterator[str]:
+    """Contradictions of the levels of a pocket with its other keys."""
+    if op.levels_mm is None:
+        return
+    if op.levels_mm != "limit":
+        whole, depth = sum(op.levels_mm), depth_of(op, finished=True) - (op.floor_allowance_mm or 0.0)
+        if abs(whole - depth) > 1e-6:
+            yield f"{at}.levels_mm: {whole:g} mm deep together: must be {depth:g}, the depth that clears"
+        if max(op.levels_mm, default=0.0) > op.axial_depth_mm + 1e-9:
+            yield f"{at}.levels_mm: {max(op.levels_mm):g}: must be at most axial_depth_mm = {op.axial_depth_mm:g}"
+        return
+    cutter, finish = cutters.get(op.cutter), op.wall_finish
+    needs = {
+        "[workpiece]": table.workpiece is not None,
+        "[stiffness]": table.stiffness is not None or (cutter is not None and cutter.tip_stiffness is not None),
+        "limits.form_error_um": table.limits.stated.get("form_error_um") is not None,
+        "a part.file that ends in .step": table.part.file.lower().endswith((".step", ".stp")),
+    }
+    for need in (name for name, stated in needs.items() if not stated):
+        yield f"{at}.levels_mm = 'limit': needs {need}, by which the walls bend: state it, or the depths of the levels"
+    if finish is not None and (not finish.by_level or finish.axial_depth_mm is not None):
+        yield (
+            f"{at}.levels_mm = 'limit': the walls are finished with each level: state wall_finish.by_level = true "
+            "without wall_finish.axial_depth_mm"
+        )
+    if op.floor_allowance_mm or op.tabs is not None or op.side == "outside":
+        yield f"{at}.levels_mm = 'limit': plans a pocket down to its floor: leave out floor_allowance_mm, tabs and side"
 
 
 def left_on_walls(op: OperationTable) -> float:
@@ -193,4 +223,10 @@ def _unused_keys(table: ContourJobTable) -> tuple[str, ...]:
         known = {*ALWAYS, "clearance_mm", *NEEDS[op.kind], *MAY[op.kind]}
         stated = [key for key in type(op).model_fields if getattr(op, key) is not None]
         out += [f"operation.{k}.{key}: not used by kind = {op.kind}" for key in stated if key not in known]
+    if all(op.levels_mm != "limit" for op in table.operation):
+        out += [
+            f"{name}: not used without operation.levels_mm = 'limit'"
+            for name in ("stiffness", "workpiece")
+            if getattr(table, name) is not None
+        ]
     return tuple(out)

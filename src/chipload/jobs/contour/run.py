@@ -34,6 +34,7 @@ from chipload.jobs.contour.job import ContourJob, left_on_walls
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.jobs.contour.part import clear_of_each_other, read_part, require_within_travel
 from chipload.jobs.contour.tables import OperationTable
+from chipload.jobs.contour.wall_states import levels_text, planned_levels
 from chipload.jobs.contour.written_operation import WrittenOperation
 from chipload.jobs.tables import value_of
 from chipload.machine.machine import Machine, machine_named, read_machine
@@ -273,7 +274,12 @@ def _operation(
 ) -> Operation:
     cutter = job.cutters[op.cutter]
     op, advice = _resolve_operation(job, inputs, op)
-    result = _plan(job, inputs, op, cutter, planned, lambda done, what: progress(0.5 * done, what))
+    first = 0.0
+    if op.levels_mm == "limit":
+        first = 0.25
+        op, text = with_levels(job, op, inputs, lambda done, what: progress(first * done, what))
+        advice = (*advice, text)
+    result = _plan(job, inputs, op, cutter, planned, lambda done, what: progress(first + (0.5 - first) * done, what))
     result = replace(result, findings=(*result.findings, *advice))
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     checks = default_checks(value_of(CheckSettings, job.table.checks), {cutter.number: cutter}, inputs.material)
@@ -290,6 +296,13 @@ def _operation(
         made = written.with_strategy(made, strategy, partial(part, start=start + share))
         made = replace(made, verifications={**made.verifications, name: verification})
     return made
+
+
+def with_levels(job: ContourJob, op: OperationTable, inputs: Inputs, progress: Progress) -> tuple[OperationTable, str]:
+    """The operation with its planned levels, and a sentence on them."""
+    found = planned_levels(job, op, inputs.contours, inputs.top, inputs.material, progress)
+    depths = tuple(found.depths.tolist())
+    return op.model_copy(update={"levels_mm": depths}), levels_text(found, job.limits["form_error_um"])
 
 
 def _inserted_text(inputs: Inputs, operations: Sequence[Operation]) -> tuple[str, str]:
@@ -389,6 +402,7 @@ def _planner_request(
             link_feed=None if op.link_feed_mm_min is None else mm_s_from_mm_min(op.link_feed_mm_min),
             link_lift=LINK_LIFT_MM if op.link_lift_mm is None else op.link_lift_mm,
             depth=op.depth_mm,
+            level_depths=op.levels_mm if isinstance(op.levels_mm, tuple) else (),
             stock=inputs.stock,
             around=op.side == "outside",
             holes=op.holes_mm or (),

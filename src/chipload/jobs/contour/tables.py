@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from chipload.cutter.table import CutterTable
+from chipload.jobs.simulation.tables import StiffnessTable, WorkpieceTable
 from chipload.jobs.tables import (
     Count,
     LimitsTable,
@@ -179,6 +180,18 @@ class OperationTable(Table):
     depth_mm: Positive | None = Field(
         None, description="depth of the pocket, cut in equal levels of at most axial_depth_mm; default: one level"
     )
+    levels_mm: Literal["limit"] | tuple[Positive, ...] | None = Field(
+        None,
+        description="depths of the levels of a pocket from above, in place of equal ones; limit: the fewest, each at "
+        "most axial_depth_mm deep, at which cutter and part keep limits.form_error_um at the walls (needs [workpiece])",
+    )
+    levels_reserve: float | None = Field(
+        None,
+        ge=0.0,
+        le=0.9,
+        description="share of limits.form_error_um that planned levels leave to the error of their simulation; "
+        "default 0.3",
+    )
     holes_mm: tuple[Hole, ...] | None = Field(
         None, description="pre-drilled holes for the entry, as deep as the pocket: x, y and diameter of each"
     )
@@ -207,6 +220,8 @@ class ContourJobTable(Table):
     material: SourceTable
     cutter: tuple[CutterTable, ...] = Field(min_length=1)
     operation: tuple[OperationTable, ...] = Field(min_length=1)
+    stiffness: StiffnessTable | None = None
+    workpiece: WorkpieceTable | None = None
     limits: ContourLimitsTable = Field(default_factory=ContourLimitsTable.model_construct)
     checks: WallChecksTable = Field(default_factory=WallChecksTable.model_construct)
 
@@ -234,6 +249,8 @@ MAY: Mapping[str, tuple[str, ...]] = {
         "radial_depth_mm",
         "engagement_deg",
         "depth_mm",
+        "levels_mm",
+        "levels_reserve",
         "holes_mm",
         "rest_of",
         "allowance_mm",

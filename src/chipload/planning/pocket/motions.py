@@ -304,7 +304,7 @@ def _ramp(
 
 
 def programs_of(
-    motions: Motions, setting_feed: float, depth: float, spindle: float, tool: int, zone: str = ZONES[CUT]
+    motions: Motions, setting_feed: float, spindle: float, tool: int, zone: str = ZONES[CUT]
 ) -> list[Program]:
     """A program a run: rapid above the stock, helical bore from its top or straight down where it is clear, the motions
     at depth, up. ``zone`` is the label of those that cut.

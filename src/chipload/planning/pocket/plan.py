@@ -61,6 +61,8 @@ Floats = NDArray[np.float64]
 ABOVE_DEG = 0.01
 #: places along a wall [mm] that are held against free space, and how near to its edge they are made already
 WALL_STEP_MM, EDGE_MM = 0.05, 1e-3
+#: digits of the depth of a level [mm] within which levels are alike
+DEPTH_DIGITS = 9
 #: share of the reachable area that must be cleared
 CLEARED = 0.995
 #: what clears channels that are hardly wider than the cutter
@@ -154,9 +156,7 @@ def _history(
     each = [[motions_of(stage.path, h, stage.feed, link_feed, slope) for h in stage.heights] for stage in stages]
     parts = [
         [
-            programs_of(
-                m, stage.feed, stage.depth, signed_speed(stage.spindle_speed, cutter), cutter.number, stage.name
-            )
+            programs_of(m, stage.feed, signed_speed(stage.spindle_speed, cutter), cutter.number, stage.name)
             for m in levels
         ]
         for stage, levels in zip(stages, each, strict=True)
@@ -165,13 +165,17 @@ def _history(
     program = Program.join([p for k, j in order for p in parts[k][j]])
     ends = row_ends(program, machine)
     sampled = [samples_of(levels[0], stage.task.step) for stage, levels in zip(stages, each, strict=True)]
+    deep = [[round(h.top - h.floor, DEPTH_DIGITS) for h in stage.heights] for stage in stages]
     made = [
-        _columns(stage, levels[0], samples, setting, cutter, material, machine)
-        for stage, levels, samples in zip(stages, each, sampled, strict=True)
+        {
+            depth: _columns(stage, depth, levels[depths.index(depth)], samples, setting, cutter, material, machine)
+            for depth in dict.fromkeys(depths)
+        }
+        for stage, depths, levels, samples in zip(stages, deep, each, sampled, strict=True)
     ]
     rows, first, travelled = [], 0, 0.0
     for k, j in order:
-        m, runs, samples, (columns, own) = each[k][j], parts[k][j], sampled[k], made[k]
+        m, runs, samples, (columns, own) = each[k][j], parts[k][j], sampled[k], made[k][deep[k][j]]
         count = sum(len(p) for p in runs)
         time = clock(m, samples, own, runs, ends[first : first + count])
         z = m.height[samples.motion]
@@ -188,6 +192,7 @@ def _history(
 
 def _columns(
     stage: PocketStage,
+    depth: float,
     motions: Motions,
     samples: MotionSamples,
     setting: Clearing,
@@ -195,7 +200,7 @@ def _columns(
     material: Material,
     machine: Machine,
 ) -> tuple[Columns, Floats]:
-    """Columns of one level of a stage, and the time within its runs [s]."""
+    """Columns of one level of a stage, ``depth`` [mm] deep, and the time within its runs [s]."""
     radius, task = cutter.radius, stage.task
     met, most = replay_motions(motions, samples, radius, task.free, stage.before)
     met = engagement_of_hand(met, cutter)
@@ -206,10 +211,10 @@ def _columns(
     off = distance(task.region.segments, samples.centre) - radius - stage.allowance
     makes_wall = (np.abs(off) <= 2.0 * CHORD * radius) & (kind == CUT) & stage.makes_wall
     place = (zone, length, own, samples.centre, samples.heading, 0.0, met, speed, makes_wall)
-    cut = CutConditions(cutter, material, stage.depth, stage.spindle_speed, setting.milling, *setting.rigid)
+    cut = CutConditions(cutter, material, depth, stage.spindle_speed, setting.milling, *setting.rigid)
     columns: Columns = {**cost(cut, *place), "engagement_max_deg": np.degrees(most), "ramp_deg": np.zeros(len(kind))}
     if (kind == ENTRY).any():  # a turn of a bore is as deep as its pitch, a leg of a ramp as two
-        deep, steep = entries(motions, stage.depth)
+        deep, steep = entries(motions, depth)
         thin = {**cost(replace(cut, axial_depth=deep), *place), "ramp_deg": np.full(len(kind), math.degrees(steep))}
         columns = {k: np.where(kind == ENTRY, thin.get(k, v), v) for k, v in columns.items()}
     return columns, own

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
+
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED
 from chipload.cutting.wall_error import Milling
 from chipload.errors import InputError
@@ -22,6 +24,8 @@ from chipload.planning.pocket.tabs import Tabs
 
 #: height of a link above the floor where none is stated [mm]
 LINK_LIFT_MM = 0.1
+#: heights [mm] nearer to each other than this are one
+LEVEL_MM = 1e-6
 #: how far beside the stock the centre may go around a part that stands in it, in R
 AROUND = 1.05
 
@@ -76,6 +80,7 @@ class Clearing:
     link_feed : of links through cleared space [mm/s], None: the machine's greatest
     link_lift : how far links stay off the floor, where they are long enough
     depth : of the pocket, cut in equal depths of at most ``axial_depth``; None: one of ``axial_depth``
+    level_depths : of the levels that clear, from above, in place of equal ones; none: equal ones
     stock : outline of the stock, closed contours; none: material everywhere
     around : the contours are those of a part that stands in the stock, which is cleared around it
     holes : (x, y, diameter) of pre-drilled holes as deep as the pocket
@@ -102,6 +107,7 @@ class Clearing:
     link_feed: float | None = None
     link_lift: float = LINK_LIFT_MM
     depth: float | None = None
+    level_depths: tuple[float, ...] = ()
     stock: tuple[Contour, ...] = ()
     around: bool = False
     holes: tuple[tuple[float, float, float], ...] = ()
@@ -123,7 +129,7 @@ class Clearing:
     @property
     def levels(self) -> list[Heights]:
         """The heights of the program at each depth that clears, from above."""
-        return self.levels_between(self.top, self.bottom + self.floor_allowance, self.axial_depth)
+        return self.clearing_levels(self.top, self.bottom + self.floor_allowance)
 
     @property
     def heights(self) -> Heights:
@@ -138,7 +144,18 @@ class Clearing:
     def levels_between(self, top: float, floor: float, axial_depth: float) -> list[Heights]:
         """The heights of equal levels of at most ``axial_depth`` [mm], from above."""
         count = max(1, math.ceil((top - floor) / axial_depth - 1e-9))
-        edges = [top + (floor - top) * k / count for k in range(count)] + [floor]
+        return self._levels_at([top + (floor - top) * k / count for k in range(count)] + [floor])
+
+    def clearing_levels(self, top: float, floor: float) -> list[Heights]:
+        """The heights of the levels that clear between two heights [mm], from above."""
+        if not self.level_depths:
+            return self.levels_between(top, floor, self.axial_depth)
+        ends = self.top - np.cumsum(self.level_depths)
+        between = ends[(ends < top - LEVEL_MM) & (ends > floor + LEVEL_MM)].tolist()
+        return self._levels_at([top, *between, floor])
+
+    def _levels_at(self, edges: Sequence[float]) -> list[Heights]:
+        """The heights of levels between neighbouring ``edges`` [mm], from above."""
         safe = self.top + self.clearance
         return [Heights(low, min(low + self.link_lift, high), high, safe) for high, low in pairwise(edges)]
 

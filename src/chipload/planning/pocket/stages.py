@@ -73,8 +73,8 @@ class PocketStage:
 
     @property
     def depth(self) -> float:
-        """Axial depth of each level [mm]."""
-        return self.heights[0].top - self.heights[0].floor
+        """Greatest axial depth of a level [mm]."""
+        return max(h.top - h.floor for h in self.heights)
 
 
 def require_finish(setting: Clearing) -> None:
@@ -193,7 +193,7 @@ def _stages(
         number,
         task,
         path,
-        tuple(setting.levels_between(section.top, section.floor + left, setting.axial_depth)),
+        tuple(setting.clearing_levels(section.top, section.floor + left)),
         setting.feed,
         setting.spindle_speed,
         setting.allowance,
