@@ -105,6 +105,42 @@ def test_a_feed_that_is_held_is_no_fault() -> None:
     assert found == []
 
 
+@pytest.mark.parametrize("jump", [-40.0, 1e9, 30.0])
+def test_a_clock_that_jumps_is_followed(jump: float) -> None:
+    """A clock that is set, or begins again with a new file, hides no fault after it, and is none; one sample of before
+    is left out.
+    """
+    one = stream(104, Truth(1.0, 1.0, 1.0, 0.0))
+    power, own = with_fault(one, "watch-air")
+    middle = int(np.flatnonzero(own)[0]) // 2
+    time = one.time + np.where(np.arange(len(one.time)) > middle, jump, 0.0)
+    time[middle // 2] -= 5.0
+    for values, codes in ((one.power, []), (power, ["watch-air"])):
+        watch, found = LoadWatch(one.program, SIGNAL, PRIOR), []
+        for t, p, line in zip(time, values, one.line, strict=True):
+            found += watch.add(float(t), float(p), int(line))
+        assert [f.code for f in found] == codes
+        assert watch.clock.jumps == 1
+        assert watch.clock.first_jump == pytest.approx((jump + 0.1, 0.1 * middle), abs=0.5)
+        assert watch.clock.now == pytest.approx(one.time[-1], abs=1.0)
+
+
+def test_after_a_gap_the_rest_of_the_line_is_not_judged() -> None:
+    """Samples of 10 s are lost in a line that cuts for 20 s and then goes through air for 20 s: it is not a broken
+    tool that the load ends 10 s before the place without the gap.
+    """
+    rows = np.arange(1, 451)
+    load = np.where((rows > 50) & (rows <= 250), 900.0, 0.0)
+    program = PredictedTorque(
+        0.1 * rows, 800.0 + 0.0 * load, load, 0.5 * load, np.where(rows <= 50, 1, 2), np.ones(450, dtype=np.int64)
+    )
+    watch, found = LoadWatch(program, SIGNAL, PRIOR), []
+    for k in (k for k in range(450) if not 100 < k < 200):
+        found += watch.add(0.1 * k, 2e5 + 1.5 * load[k] * 800.0 / EFFICIENCY, int(program.line[k]))
+    assert found == []
+    assert watch.clock.jumps == 1
+
+
 def test_settings_out_of_range() -> None:
     with pytest.raises(InputError, match="false_alarms = 0: must be above 0 and at most 100 an hour"):
         WatchSettings(false_alarms=0.0)

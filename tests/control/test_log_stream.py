@@ -156,8 +156,9 @@ def test_an_agent_that_is_silent_and_started_again(agent: tuple[str, int]) -> No
     assert "it is asked again until it answers" in said[1]
     assert said[2] == "the agent answers again"
     assert said[3] == "samples are lost: the agent was started again"
-    assert [text.startswith(f"line {line}: ") for text in said[4:-1]] == [True]
+    assert [text.startswith(f"line {line}: ") for text in said[4:-2]] == [True]
     assert "missing stock" in said[4]
+    assert said[-2].startswith("jumps and gaps of the clock: 1, the first of 15 s at ")
     assert said[-1].endswith("; 1 alarm")
     assert call("watch", "http://127.0.0.1:9", "--job", "job.toml")[0] == 2
 

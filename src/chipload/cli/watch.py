@@ -191,6 +191,12 @@ def _pins(
 
 def _summary(one: LoadWatch, found: int) -> int:
     """Write what was watched, and return the exit code."""
+    if one.clock.jumps:
+        size, at = (number_text(x) for x in one.clock.first_jump)
+        show(
+            f"jumps and gaps of the clock: {one.clock.jumps}, the first of {size} s at {at} s; until the next line "
+            "nothing was judged"
+        )
     whole, cut, judged = (number_text(x, 3) for x in (one.seconds, one.cut_seconds, one.judged_seconds))
     show(f"{whole} s watched, {cut} s of them in the cut, {judged} s judged; {found} alarm{'' if found == 1 else 's'}")
     if one.judged_seconds == 0.0:

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from chipload.control.learning import Signal, tangential_shares
 from chipload.control.log_alignment import PredictedTorque
+from chipload.control.sample_clock import SampleClock
 from chipload.control.short_cuts import short_cuts
 from chipload.cutting.load_parts import with_spread
 from chipload.cutting.material import Material
@@ -242,8 +243,10 @@ class LoadWatch:
         self.finished = self._is_last = False
         # samples, those in a line that is not of the program, and the longest time between two
         self._samples = self._outside = 0
-        self._previous: float | None = None
         self._apart = _Mean()
+        #: of the samples
+        self.clock = SampleClock()
+        self._is_lost = False
 
     @property
     def why_not_judged(self) -> str:
@@ -253,8 +256,9 @@ class LoadWatch:
         if self._outside > 0.9 * self._samples:
             share = number_text(100.0 * self._outside / self._samples, 3)
             return f"{share} % of the samples are of a line that the program does not have: state the job that runs"
-        if 2.0 * self._apart.mean > self._settings.block_s:
-            apart, most = number_text(self._apart.mean, 3), number_text(0.5 * self._settings.block_s)
+        step = self.clock.first_jump[0] if 2 * self.clock.jumps > self._samples else self._apart.mean
+        if 2.0 * step > self._settings.block_s:
+            apart, most = number_text(step, 3), number_text(0.5 * self._settings.block_s)
             return f"samples are {apart} s apart, at most {most} s is needed: log faster, or check the unit of the time"
         known = [idle.mean for idle in self._idle.values() if idle.count >= AIR_BLOCKS]
         if not known:
@@ -270,21 +274,24 @@ class LoadWatch:
 
         Parameters
         ----------
-        time : [s], rising; an earlier sample is left out
+        time : [s]; a sample of before is left out, and a clock that jumps is that of :attr:`clock`
         value : of the signal
         line : of the program that runs
         override : of the feed
         """
-        self._begin = time if self._begin is None else self._begin
         self._samples += 1
-        if self._previous is not None and time > self._previous:
-            self._apart.add(time - self._previous, self._samples)
-        self._previous = time
+        jumps, before = self.clock.jumps, self.clock.now
+        if not self.clock.take(time):
+            return []
+        time, is_first = self.clock.now, self._begin is None
+        self._begin = time if self._begin is None else self._begin
+        # where it is in its line is not known after a jump
+        self._is_lost |= self.clock.jumps > jumps
+        if not is_first:
+            self._apart.add(time - before, self._samples)
         place = self._place(time, line, override)
-        self._outside += place < 0.0
+        self._outside += self._row < 0
         out: list[Finding] = []
-        if self._block and time <= self._block[-1][0]:
-            return out
         window = self._windows.at(place)
         if self._block and (
             window != self._window or (window < 0 and time - self._block[0][0] >= self._settings.block_s)
@@ -317,8 +324,8 @@ class LoadWatch:
             later = rows[rows >= max(self._row, 0)]
             self._row = int(later[0] if len(later) else rows[0])
             self._line, self._since, self._line_since = line, time, self._blocks
-            self._done, self._last = 0.0, time
-        if self._row < 0:
+            self._done, self._last, self._is_lost = 0.0, time, False
+        if self._row < 0 or self._is_lost:
             return -1.0
         self._done += max(time - self._last, 0.0) * override
         self._last = time
