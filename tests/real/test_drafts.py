@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from chipload.errors import InputError
+from chipload.geometry.step_faces import read_faces
 from chipload.jobs import check_job, load_job
+from chipload.jobs.drafts.blade import draft_blade_model
 from chipload.jobs.drafts.draft import write_draft
 from chipload.jobs.drafts.make import draft_of
 
@@ -48,8 +50,9 @@ def test_a_draft_of_a_real_file(name: str, tmp_path: Path) -> None:
 
 
 def test_a_model_whose_largest_faces_are_no_wall_is_refused(tmp_path: Path) -> None:
-    """The job of its two largest curved faces could not be run: one of them folds."""
+    """A thin wall of the two largest curved faces of a wheel could not be run: one of them folds."""
+    file = DATA / "cad" / "impeller_kj66" / "impeller.step"
     with pytest.raises(
         InputError, match=r"the largest curved faces, 88 and 3, are not sides of a thin wall: .*; chipload"
     ):
-        draft_of(DATA / "cad" / "impeller_kj66" / "impeller.step", tmp_path)
+        draft_blade_model(file, tmp_path, read_faces(file))

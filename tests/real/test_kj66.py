@@ -11,6 +11,8 @@ from chipload.cutter.catalogue import read_catalogue
 from chipload.examples import copy_example
 from chipload.geometry.step_faces import read_faces
 from chipload.jobs import check_job, load_job, run_job
+from chipload.jobs.drafts.draft import write_draft
+from chipload.jobs.drafts.make import draft_of
 from chipload.jobs.impeller.flank import checked_flanks
 from chipload.jobs.impeller.flow import AGAINST_Z
 from chipload.jobs.impeller.part import read_part
@@ -179,3 +181,18 @@ def test_its_bulging_side_is_milled_by_the_flank_in_passes(tmp_path):
             away = np.minimum(away, np.where(h >= 1.0, d, np.inf))
     assert away.max() < 0.1
     assert away.min() > -0.1
+
+
+def test_the_whole_wheel_becomes_a_job(tmp_path):
+    """Without a face named: points of the sides lie on the faces by the CAD kernel's distance, of one of its blades."""
+    draft = draft_of(FILE, tmp_path / "job")
+    assert draft.notes[0] == "9 blades, outer diameter 100.2 mm"
+    assert draft.notes[2].startswith("the blades of the model differ: ")
+    part = read_part(load_job(write_draft(draft, tmp_path / "job")).job)
+    model, R = read_faces(FILE), AGAINST_Z["-y"]
+    rng = np.random.default_rng(4)
+    u, v = rng.uniform(0.05, 0.95, 12), rng.uniform(0.05, 0.95, 12)
+    sides = [face for face in model.faces if face.kind not in ("plane", "cylinder") and face.area > 500.0]
+    for patch in (part.impeller.blade.plus, part.impeller.blade.minus):
+        p = (patch.at(u, v) @ R).tolist()
+        assert max(min(face.distance(q) for face in sides) for q in p) < 0.03

@@ -9,7 +9,7 @@ where the chain leaves. The rings follow from the topology alone, so they close 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -132,7 +132,27 @@ def _bodies(vertices: Floats, faces: Ints) -> Ints:
 
 def _rings(vertices: Floats, faces: Ints, body: Ints, h: float) -> tuple[list[Floats], list[int]]:
     """(k, 2) points of each ring in the plane z = h, and its body."""
-    above = (vertices[:, 2] >= h)[faces]
+    rings, of = list[Floats](), list[int]()
+    z = vertices[:, 2]
+    for first, last, own in _trace_rings(faces, z, h):
+        a, b = vertices[first], vertices[last]
+        part = ((h - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
+        rings.append(a[:, :2] * (1.0 - part) + b[:, :2] * part)
+        of.append(int(body[own]))
+    return rings, of
+
+
+def level_rings(faces: Ints, values: Floats, level: float) -> list[tuple[Ints, Ints]]:
+    """The rings on which values (n,) at the vertices of a closed mesh have a level.
+
+    Each is both vertices (k,) of the edges that it crosses, in its order.
+    """
+    return [(first, last) for first, last, _ in _trace_rings(faces, values, level)]
+
+
+def _trace_rings(faces: Ints, values: Floats, level: float) -> Iterator[tuple[Ints, Ints, int]]:
+    """Vertices (k,), (k,) of the edges of each ring, and one of its faces."""
+    above = (values >= level)[faces]
     cut = above.any(axis=1) & ~above.all(axis=1)
     f, up = faces[cut], above[cut]
     rows = np.arange(len(f))
@@ -143,11 +163,7 @@ def _rings(vertices: Floats, faces: Ints, body: Ints, h: float) -> tuple[list[Fl
     # a chain enters the next face by the edge by which it left the last one; four faces at an edge form any two pairs
     onward_of: Ints = np.empty(len(f), dtype=np.int64)
     onward_of[np.lexsort(last.T)] = np.lexsort(first.T)
-    a, b = vertices[first[:, 0]], vertices[first[:, 1]]
-    part = ((h - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
-    points = a[:, :2] * (1.0 - part) + b[:, :2] * part
-    rings, of = list[Floats](), list[int]()
-    own = body[cut]
+    numbers = np.flatnonzero(cut)
     onward = onward_of.tolist()
     done = [False] * len(onward)
     for start in range(len(onward)):
@@ -158,9 +174,7 @@ def _rings(vertices: Floats, faces: Ints, body: Ints, h: float) -> tuple[list[Fl
             ring.append(at)
             at = onward[at]
         if len(ring) > 2:
-            rings.append(points[ring])
-            of.append(int(own[start]))
-    return rings, of
+            yield first[ring, 0], first[ring, 1], int(numbers[start])
 
 
 def _area_of_bodies(rings: list[Floats], of: list[int]) -> MultiPolygon:

@@ -21,12 +21,15 @@ from chipload.geometry.step_faces import Face, read_faces
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
 from chipload.jobs.drafts.found import found_lines
+from chipload.jobs.drafts.wheel import draft_wheel
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.number_text import number_text
 from chipload.planning.contour.offsets import centre_paths, walls_of
 from chipload.planning.contour.passes import run_on_length
 from chipload.units import MM_PER, rpm_from_rad_s
 
+#: kinds of faces that are planes or of revolution
+REVOLVED = ("plane", "cylinder", "cone", "sphere", "torus", "of revolution")
 #: diameters that a shop has [mm], largest first
 DIAMETERS = (20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)
 #: share of the area that the guessed cutter must reach
@@ -187,6 +190,11 @@ def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
         The model cannot be read.
     """
     model = read_faces(file, "part.file")
+    # a wheel has curved faces that are none of revolution
+    if sum(f.kind not in REVOLVED for f in model.faces) >= 3:
+        wheel = draft_wheel(file, folder, machine)
+        if wheel is not None:
+            return wheel
     planes = [f for f in model.faces if f.kind == "plane" and float(f.high[2] - f.low[2]) < 1e-6]
     if not planes:
         from chipload.jobs.drafts.blade import draft_blade_model

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +51,23 @@ def holds_impeller(file: Path) -> bool:
     return head.lower().startswith("span_index")
 
 
+@dataclass(frozen=True)
+class RowNotes:
+    """Where the numbers of a blade row come from.
+
+    Parameters
+    ----------
+    blades, unit : of the number of blades and of the unit of length; empty: the file states it
+    guess : whether both are guesses
+    found : what else was found in the file
+    """
+
+    blades: str = ""
+    unit: str = ""
+    guess: bool = False
+    found: tuple[str, ...] = ()
+
+
 def draft_impeller(file: Path, folder: Path, machine: str | None = None) -> Draft:
     """The draft of an impeller job: both sides of its blades and the floor between them, roughed and finished.
 
@@ -57,26 +76,47 @@ def draft_impeller(file: Path, folder: Path, machine: str | None = None) -> Draf
     InputError
         The files cannot be read, or no blade can be lofted through their sections.
     """
-    row = read_blade_row(file) if is_blade_row(file) else _row_of_table(file)
+    if is_blade_row(file):
+        row, notes = read_blade_row(file), RowNotes()
+    else:
+        row = _row_of_table(file)
+        outer = _outer([_body(row, 0)])
+        notes = RowNotes("the table states none", f"the table names none; the wheel has {outer:.4g} mm", True)
+    names = {path: relative(path, folder) for path in (row.profile, row.hub, row.shroud)}
+    return draft_row(file, row, names, notes, machine)
+
+
+def draft_row(
+    file: Path,
+    row: BladeRow,
+    names: Mapping[Path, str],
+    notes: RowNotes,
+    machine: str | None,
+    files: Mapping[str, bytes] | None = None,
+) -> Draft:
+    """The draft of an impeller job for a blade row.
+
+    Parameters
+    ----------
+    file : the file that the draft is made from
+    names : of the files of the row, as the job has them
+    files : more files beside the job
+    """
     bodies = [_body(row, k) for k in range(2 if row.splitter else 1)]
-    outer = 2.0 * max(float(np.hypot(p[:, 0], p[:, 1]).max()) for _, sections in bodies for p in sections)
+    outer = _outer(bodies)
     blade = bodies[0][0]
-    whole = is_blade_row(file)
     part = (
-        Entry("blades", row.blades, "" if whole else "the table states none", not whole),
+        Entry("blades", row.blades, notes.blades, notes.guess),
         Entry("outer_diameter_mm", round(outer, 3), "of the sections"),
     )
     ahead = round(min(0.02 * outer, _ahead(row, blade)), 2)
+    profile = names[row.profile]
     sections = (
-        Entry("blade", [relative(row.profile, folder)], f"{len(bodies[0][1])} sections"),
-        *(
-            (Entry("splitter", [relative(row.profile, folder)], "the second blade of the file"),)
-            if row.splitter
-            else ()
-        ),
-        Entry("hub", relative(row.hub, folder)),
-        Entry("shroud", relative(row.shroud, folder)),
-        Entry("unit", row.unit, "" if whole else f"the table names none; the wheel has {outer:.4g} mm", not whole),
+        Entry("blade", [profile], f"{len(bodies[0][1])} sections"),
+        *((Entry("splitter", [profile], "the second blade of the file"),) if row.splitter else ()),
+        Entry("hub", names[row.hub]),
+        Entry("shroud", names[row.shroud]),
+        Entry("unit", row.unit, notes.unit, notes.guess and bool(notes.unit)),
         *((Entry("axis", row.axis),) if row.axis != "z" else ()),
         Entry("hub_ahead_mm", ahead, "length of the hub before the blades that is milled", True),
     )
@@ -101,13 +141,19 @@ def draft_impeller(file: Path, folder: Path, machine: str | None = None) -> Draf
         DraftTable("machine", (own,)),
         *_operation(size, narrow, high, gouge),
     )
-    notes = (
+    lines = (
         f"{row.blades} blades{', a splitter between two' if row.splitter else ''}, outer diameter {outer:.4g} mm",
+        *notes.found,
         f"two blades are {narrow:.3g} mm apart where they are narrowest, and up to {high:.3g} mm high",
         "pallet and fixtures: state [machine_table] and [[fixture]], else nothing below the part is known",
     )
     title = f"Plan the cutters, table angles and programs of the impeller of {file.name}."
-    return Draft(title, tables, notes, {"cutters.toml": _catalogue(size, high).encode()})
+    return Draft(title, tables, lines, {**(files or {}), "cutters.toml": _catalogue(size, high).encode()})
+
+
+def _outer(bodies: list[tuple[Blade, tuple[Floats, ...]]]) -> float:
+    """Outer diameter of sections [mm]."""
+    return 2.0 * max(float(np.hypot(p[:, 0], p[:, 1]).max()) for _, sections in bodies for p in sections)
 
 
 def _row_of_table(file: Path) -> BladeRow:

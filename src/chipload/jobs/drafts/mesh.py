@@ -17,6 +17,7 @@ from chipload.geometry.pocketed_part import Pocket, find_pockets
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry
 from chipload.jobs.drafts.drawing import axial_depth, cutter_for, machine_of, planned_tables
 from chipload.jobs.drafts.found import list_pockets
+from chipload.jobs.drafts.wheel import draft_wheel
 from chipload.number_text import number_text
 
 #: what a mesh without a pocket needs
@@ -28,7 +29,7 @@ STRAIGHT = 1e-4
 
 
 def draft_mesh(file: Path, folder: Path, machine: str | None = None) -> Draft:
-    """Return the draft of the pockets of a mesh whose floors are level: those of the height with the largest floors.
+    """Return the draft of the blades of a wheel, or of the pockets of a mesh at the height with the largest floors.
 
     Raises
     ------
@@ -37,6 +38,9 @@ def draft_mesh(file: Path, folder: Path, machine: str | None = None) -> Draft:
     """
     if file.suffix.lower() != ".stl":
         raise InputError(f"{file}: a mesh of this kind has no faces or contours to plan from: {REMEDY}")
+    wheel = draft_wheel(file, folder, machine)
+    if wheel is not None:
+        return wheel
     mesh = read_mesh(file, unit="mm", key="part.file")
     found = find_pockets(mesh)
     closed = [p for p in found if not p.open and p.floor_thickness_mm > 0.0]
