@@ -32,7 +32,7 @@ def lever(poly, z):
     return poly[0] + z * (poly[1] + z * (poly[2] + z * poly[3]))
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def whole(v, lag, w, u, rho, share):
     """Add a point of the edge to the factors ``v`` of the rotations at which all of its edge cuts: ``u`` its levers,
     ``share`` of the edge [mm].
@@ -80,7 +80,7 @@ def whole(v, lag, w, u, rho, share):
         v[j + 5] += k * k5
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def add_between(sums, m0, m1, v, c, s):
     """Add the factors ``v`` to ``sums[m0]``, where they begin, and take them from ``sums[m1]``, where they end; the
     rotations are counted from one whose cosine and sine are ``c`` and ``s``. The last column counts what cuts.

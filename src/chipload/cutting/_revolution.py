@@ -50,7 +50,7 @@ def weights(along, offset, across, sine, cosine, c, out):
     out[8] = ka * across
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def add_whole(sums, m0, m1, cl, sl, one, two, w, size, arm):
     """Add the loads of an edge that cuts whole at the rotations ``m0`` to ``m1``: to ``sums[m0]`` what begins there,
     from ``sums[m1]`` what ends.
@@ -222,7 +222,7 @@ def same(i, j, start, rows, tooth, piece, slices, frame, left):
     return True
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def thickest(p, q, along, across):
     """Greatest along sin(phi) + across cos(phi) of the immersion p .. q."""
     cp = math.cos(p)

@@ -258,7 +258,7 @@ def systems(A, end, inverse, slopes, cuts):
             inverse[i] = np.linalg.inv(B)
 
 
-@njit(cache=True, nogil=True, fastmath=True, inline="always")
+@njit(cache=True, nogil=True, fastmath=True)
 def delayed_coordinate(history, k, t, b, d):
     """Coordinate b of the state a share t of a cell after node k, and one cell later: first, h first', last, h last'.
 

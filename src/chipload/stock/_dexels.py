@@ -29,7 +29,7 @@ EVEN = 1e-3
 RATIO = 0.6180339887498949
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def band(z0, slope, low, high):
     """Interval of s in which low <= z0 + slope s <= high."""
     if abs(slope) < 1e-15:

@@ -58,7 +58,7 @@ def orient_exact(ax, ay, bx, by, cx, cy):
     return total
 
 
-@njit("float64(float64, float64, float64, float64, float64, float64)", cache=True, nogil=True, inline="always")
+@njit("float64(float64, float64, float64, float64, float64, float64)", cache=True, nogil=True)
 def orient(ax, ay, bx, by, cx, cy):
     """Twice the area of the triangle A, B, C: above 0 where C is left of A to B, 0 only where they are in line."""
     left = (ax - cx) * (by - cy)

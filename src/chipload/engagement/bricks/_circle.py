@@ -24,7 +24,7 @@ ASIDE = 1e-4
 SECANTS = 12
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def ask_circle(ring, c, s, index, hint, wait):
     """MATERIAL, AIR or the move that swept the direction (c, s) of the circle; ``hint`` is tested first."""
     return what_is(
@@ -33,7 +33,7 @@ def ask_circle(ring, c, s, index, hint, wait):
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def swept_at(ring, c, s, e, index, wait):
     """Whether the move e swept a direction of the circle."""
     return swept(
@@ -42,7 +42,7 @@ def swept_at(ring, c, s, e, index, wait):
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def estimated_least_at(ring, c, s, e, index):
     """Estimate of the distance [mm] of the direction (c, s) from the volume that move e swept, negative within."""
     return estimated_least(
@@ -51,7 +51,7 @@ def estimated_least_at(ring, c, s, e, index):
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def solid_at(ring, c, s, index):
     """Whether a direction of the circle is in the initial body."""
     return solid(

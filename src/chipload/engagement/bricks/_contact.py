@@ -230,7 +230,7 @@ def engage_rows(q, group, t, once, index, work, nodes, flank, slices, rows, owne
     return True
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def instants_of(
     k, q, n, group, count, each, once, state, index, work, nodes, flank, slices, rows, owner, entry, out, entries
 ):

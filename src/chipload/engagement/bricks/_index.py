@@ -36,7 +36,7 @@ _F1, _F2, _I1, _S1, _S2 = (
 INDEX = types.Tuple((_F1, _I1, _S1, _S2, _S1, _S1, _F2, _I1, CUTTERS, _F1, _F1, _F1, _I1, _F2, _I1, _S1, _F2))
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def solid(x, y, z, index):
     """Whether a point is in the initial body."""
     low = index[9]
@@ -59,7 +59,7 @@ def solid(x, y, z, index):
     return in_solid(x, y, z, low, high, index[14], index[15], faces, cell)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def brick_of(x, y, z, grid, shape, blocks):
     """Row of a point's brick; below 0: what its block is, or OUTSIDE."""
     i = math.floor((x - grid[0]) / grid[3])
@@ -80,7 +80,7 @@ def brick_of(x, y, z, grid, shape, blocks):
     return int(block) * MANY + ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def what_is(x, y, z, index, hint, wait):
     """MATERIAL, AIR outside the body, or a move that swept the point (x, y, z); ``hint`` is tested first."""
     row = brick_of(x, y, z, index[0], index[1], index[2])

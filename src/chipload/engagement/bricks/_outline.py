@@ -16,7 +16,7 @@ from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 _F1, _F2, _I1 = types.float64[::1], types.float64[:, ::1], types.int64[::1]
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def sweeper(x, y, z, index, hint, wait):
     """The number of a move that swept a point, ``hint`` is asked first; below 0 where none did, or outside the box."""
     row = brick_of(x, y, z, index[0], index[1], index[2])

@@ -195,7 +195,7 @@ def least_from(m, c, x, y, z, start, above, below, near, wait):
     return low, high
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def chord(m, x, y, z):
     """Chord of the path of a point in the frame of the cutter: its beginning along n, b and the axis, its motion along
     each until the end, and the greatest deviation of the path from the chord, all in mm.
@@ -214,7 +214,7 @@ def chord(m, x, y, z):
     return x0, y0, w0, m[ALONG_X], dy, dw, 0.125 * theta * (theta * math.sqrt(y0 * y0 + w0 * w0) + m[BEND])
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def nearest_time(x, y, dx, dy):
     """Time in 0..1 at which a point that moves from (x, y) by (dx, dy) is nearest to the axis."""
     along = -(x * dx + y * dy)

@@ -60,7 +60,7 @@ def halve_to_crossing(px, py, z, rho, T, cu, su, cs, ss, m, c):
     return dc, ds, bc, bs
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def crossing_direction(px, py, z, rho, T, cu, su, cs, ss, e, index):
     """Direction at which the volume that move e swept begins, between the directions u, not swept by it, and s, swept;
     and a direction just before it, not swept.

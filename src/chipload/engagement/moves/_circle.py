@@ -12,6 +12,7 @@ from numba import njit
 
 from chipload.engagement.moves._border import border, ridge
 from chipload.engagement.moves._sweep import AIR, MATERIAL, swept_by, what_is
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 PI = math.pi
 #: distance from the end of the front at which the contact is tested [rad]
@@ -23,7 +24,7 @@ APART, FEWEST = 0.35, 4
 ALONG = 1e-9
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def intervals(p, T, rho, z, low, high, end, apart, index, out, begin):
     """Find the ranges of psi in material on the circle of a slice.
 
@@ -40,6 +41,9 @@ def intervals(p, T, rho, z, low, high, end, apart, index, out, begin):
     -------
     Number of ranges
     """
+    # what a call passes counts again
+    index = borrow_arrays(index)
+    p, T, out = borrow_arrays((p, T, out))
     count = begin
     first = max(low, BESIDE - end) if end < PI else low
     last = min(high, end - BESIDE) if end < PI else high

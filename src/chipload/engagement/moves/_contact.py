@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit, types
 
 from chipload.engagement.moves._circle import ALONG, APART, intervals
@@ -154,7 +155,7 @@ def begin_at_border(p, T, table, k, inner, low, high, end, apart, index, spans):
     for _ in range(HALVINGS):
         mid = 0.5 * (inner + outer)
         z = p[2] + table[k, 6] + (mid - table[k, 2]) * rise
-        if intervals(p, T, mid, z, low, high, end, min(apart / mid, APART), index, spans, 0) == 0:
+        if intervals(p, T, mid, z, low, high, end, min(apart / mid, APART), index, spans, np.int64(0)) == 0:
             inner = mid
         else:
             outer = mid
@@ -165,7 +166,7 @@ def begin_at_border(p, T, table, k, inner, low, high, end, apart, index, spans):
     rho = 0.5 * (outer + widest)
     table[k, 6] += (rho - table[k, 2]) * rise
     table[k, 2] = rho
-    return intervals(p, T, rho, p[2] + table[k, 6], low, high, end, min(apart / rho, APART), index, spans, 0)
+    return intervals(p, T, rho, p[2] + table[k, 6], low, high, end, min(apart / rho, APART), index, spans, np.int64(0))
 
 
 @njit(cache=True, nogil=True)
@@ -237,7 +238,9 @@ def find_engagement(
         high = min(scratch[k, 10], end)
         if low >= high:
             continue
-        found = intervals(p, T, rho, p[2] + scratch[k, 6], low, high, end, min(apart / rho, APART), index, spans, 0)
+        found = intervals(
+            p, T, rho, p[2] + scratch[k, 6], low, high, end, min(apart / rho, APART), index, spans, np.int64(0)
+        )
         if found == 0:
             free = k
             continue
