@@ -18,6 +18,7 @@ from chipload.checking.stiffness import Stiffness, stiffness_of
 from chipload.checking.workpiece import default_spacing, stock_points
 from chipload.cutter.cutter import Cutter
 from chipload.machine.machine import Machine
+from chipload.program.joined_rows import join_rows
 from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, times_of
 from chipload.program.travel import leading_rows
@@ -48,6 +49,7 @@ class Bodies:
     stiffness : of cutters, holders, spindle and work
     checks : made by default
     steps : how many there are
+    joined : greatest distance of the path from the rows that stand for it [mm], and how many rows they stand for
     """
 
     program: Program
@@ -58,6 +60,7 @@ class Bodies:
     stiffness: Stiffness
     checks: DefaultChecks
     steps: int
+    joined: tuple[float, int] = (0.0, 0)
 
 
 def bodies_of(inputs: CheckInputs, reading: ProgramReading | ProgramSequence, stock: LayeredStock) -> Bodies:
@@ -74,6 +77,10 @@ def bodies_of(inputs: CheckInputs, reading: ProgramReading | ProgramSequence, st
     stiffness = stiffness_of(inputs.elasticity.stiffness, cutters)
     require_clamped(inputs.elasticity.workpiece, stock)
     program, times = time_rows(reading, cutters, machine, op.interpolation)
+    rows = len(program)
+    # a workpiece is solved where its rows cut
+    join_mm = op.join_mm if inputs.elasticity.workpiece is None else None
+    program, times, off = join_rows(program, times, join_mm or 0.0, op.step_mm)
     fine = resolution_of(op, cutters, program)
     count = count_steps(program, cutters, fine)
     points = _points_of_stock(inputs, program, stock)
@@ -81,7 +88,7 @@ def bodies_of(inputs: CheckInputs, reading: ProgramReading | ProgramSequence, st
     if part is not None:
         require_points(part.mesh, part.spacing_mm, "part")
     fixtures = inputs.surroundings.fixture_points(machine)
-    return Bodies(program, times, fine, points, fixtures, stiffness, checks, count)
+    return Bodies(program, times, fine, points, fixtures, stiffness, checks, count, (off, rows))
 
 
 def _points_of_stock(inputs: CheckInputs, program: Program, stock: LayeredStock) -> NDArray[np.float64] | None:

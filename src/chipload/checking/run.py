@@ -32,7 +32,7 @@ from chipload.checking.workpiece_compliance import (
 )
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.drilling import has_lips
-from chipload.errors import Finding
+from chipload.errors import Finding, Severity
 from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.program.read import ProgramReading
@@ -194,6 +194,7 @@ def simulate_program(
         *removal.findings,
         *_findings_of(program, steps, removal.columns, cutters, around, compliance),
         *tap_torques(reading.program, cutters, material, machine),
+        *_joined(bodies),
     )
     removal = replace(removal, resolution_error=errors, samples=recorder.samples(), findings=findings)
     if stability_watch is not None:
@@ -224,6 +225,18 @@ def _findings_of(
     if compliance is None:
         return found
     return (*found, *compliance.jumps(columns, max(c.diameter for c in cutters.values())))
+
+
+def _joined(bodies: Bodies) -> tuple[Finding, ...]:
+    """Return the finding on short blocks that are simulated as one."""
+    off, rows = bodies.joined
+    if off == 0.0:
+        return ()
+    text = (
+        f"join_mm: {rows} motions are simulated as {len(bodies.program)}, at most {off:.3g} mm from their path: leave "
+        "it out for a proof"
+    )
+    return (Finding("blocks-joined", 0, text, Severity.UNPROVEN),)
 
 
 def program_surroundings(

@@ -28,6 +28,8 @@ class SimulationSettings:
     resolution_error : estimate the error of the loads; without it limits on loads are unproven
     stock_points_mm : greatest distance of the columns or points of the stock that are compared with shank and holder;
         None: from the cutters and the size of the stock
+    join_mm : short straight cuts are simulated as one that is at most as far from them, which leaves the result
+        unproven; None: each by itself
     """
 
     step_mm: float = number_field(above=0.0, most=100.0)
@@ -38,6 +40,7 @@ class SimulationSettings:
     flank_mm: float | None = number_field(None, above=0.0)
     resolution_error: bool = True
     stock_points_mm: float | None = number_field(None, above=0.0)
+    join_mm: float | None = number_field(None, above=0.0, most=1.0)
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""

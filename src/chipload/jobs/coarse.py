@@ -55,6 +55,8 @@ FACTORS: Mapping[str, Mapping[str, tuple[float, float]]] = {
 LONGEST_STEP = 1.0
 #: layers of a stock that states none, in smallest diameters; slices of corner radii that a program job does not state
 LAYER, SLICES = 0.2, 8
+#: greatest distance of short blocks from the row that stands for them, in smallest diameters
+JOINED = 0.02
 #: cells of the stock that is shown are so many times as wide
 WIDER = 4.0
 
@@ -118,6 +120,13 @@ def _smallest(loaded: LoadedJob) -> float:
     return float(min(cutter.resolved_diameter for cutter in loaded.job.cutters.values()))
 
 
+def _may_join(job: Any) -> bool:
+    """Whether short blocks may be simulated as one: nothing is compared with the path itself."""
+    table = job.table
+    compared = (getattr(table, key, None) for key in ("part", "workpiece"))
+    return bool(job.cutters) and all(x is None for x in compared) and all(op.speeds is None for op in table.operation)
+
+
 def _of_program(loaded: LoadedJob) -> list[str]:
     """What a simulation chooses by itself where it is not stated."""
     job = loaded.job
@@ -129,6 +138,9 @@ def _of_program(loaded: LoadedJob) -> list[str]:
     for k, op in enumerate(job.table.operation):
         if op.corner_slices is None:
             out.append(f"operation.{k}.corner_slices={SLICES}")
+        if loaded.capability.name == "program" and _may_join(job):
+            join_mm = max(op.join_mm or 0.0, min(JOINED * _smallest(loaded), 1.0))
+            out.append(f"operation.{k}.join_mm={format_value(join_mm)}")
         # nothing in a coarse run is proven; new feeds keep a reserve of the error
         if op.resolution_error and loaded.capability.name == "program":
             out.append(f"operation.{k}.resolution_error=false")

@@ -224,6 +224,12 @@ class SimulateTable(Table):
         "greatest distance of the columns, or where the axis leans of the points, of the stock that are compared with "
         "shank and holder; default: from the cutters and the size of the stock",
     )
+    join_mm: Number | None = setting_field(
+        SimulationSettings,
+        "join_mm",
+        "short straight cuts are simulated as one that is at most as far from them, which leaves the result unproven; "
+        "default: each by itself",
+    )
     speeds: SpeedsTable | None = Field(None, description="new spindle speeds; needs [dynamics]; default: unchanged")
 
 
