@@ -29,7 +29,8 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from chipload.control.load_watch import MODEL_ERROR, SequentialTest, WatchSettings
+from chipload.control.load_watch import MODEL_ERROR
+from chipload.control.sequential_test import SequentialTest, WatchSettings
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2] / "shared" / "data")) / "measured"
 PHM, NASA = DATA / "nasa_phm_tables" / "phm2010", DATA / "nasa_uc_milling" / "mill.csv"

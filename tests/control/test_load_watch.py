@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chipload.control.load_watch import LoadWatch, SequentialTest, WatchSettings
+from chipload.control.load_watch import LoadWatch
 from chipload.control.log_alignment import PredictedTorque
+from chipload.control.sequential_test import SequentialTest, WatchSettings
 from chipload.errors import InputError
 from synthetic_cell import EFFICIENCY, PRIOR, SIGNAL, Truth, draw_truth
 from synthetic_stream import FAULTS, alarms_of, stream, with_fault

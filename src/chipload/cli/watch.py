@@ -100,9 +100,10 @@ def watch(
         from chipload.api.mechanics.learning import torque_of_result
         from chipload.cli.learn import program_job, run_job_now, signal_of_spindle
         from chipload.control.learning import Signal, SignalKind, power_signal
-        from chipload.control.load_watch import LoadWatch, WatchSettings
+        from chipload.control.load_watch import LoadWatch
         from chipload.control.log_stream import log_text
         from chipload.control.machine_watch import FeedHold, machine_samples
+        from chipload.control.sequential_test import WatchSettings
         from chipload.files import write_whole
 
         holding = FeedHold(hold or ())

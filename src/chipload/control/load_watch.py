@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from chipload.control.learning import Signal, tangential_shares
 from chipload.control.log_alignment import PredictedTorque
 from chipload.control.sample_clock import SampleClock
+from chipload.control.sequential_test import SequentialTest, WatchSettings
 from chipload.control.short_cuts import short_cuts
 from chipload.cutting.load_parts import with_spread
 from chipload.cutting.material import Material
@@ -58,79 +59,12 @@ MOST_IDLE = 20.0
 LEAST_SAMPLES = 4
 #: blocks of the idle signal that count, so that it may drift
 IDLE_MEMORY = 120
-#: tests that share the false alarms of an hour
-TESTS = 3
 #: deviations of the scale of a tool that are believed: of right tools 1 of 1,000 is further away
 BELIEVED = 3.29
 #: feed override below which the feed counts as held
 LEAST_OVERRIDE = 0.05
 #: rate at which a line may run faster or slower than calculated
 PACE = 0.1
-
-
-@dataclass(frozen=True)
-class WatchSettings:
-    """What an alarm is.
-
-    Parameters
-    ----------
-    false_alarms : that are allowed in an hour in the cut, above 0
-    wear : load over that of the sharp tool, above 1.1
-    block_s : length of a block [s]
-    lag_s : how far the line of a sample may be wrong in time [s]
-
-    Raises
-    ------
-    InputError
-        A number is out of range.
-    """
-
-    false_alarms: float = 0.1
-    wear: float = 1.3
-    block_s: float = 0.5
-    lag_s: float = 0.2
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.false_alarms <= 100.0:
-            raise InputError(f"false_alarms = {self.false_alarms:g}: must be above 0 and at most 100 an hour")
-        if not 1.1 < self.wear <= 5.0:
-            raise InputError(f"wear = {self.wear:g}: must be above 1.1 and at most 5 times the load of the sharp tool")
-        for name, value in (("block_s", self.block_s), ("lag_s", self.lag_s)):
-            if not 0.0 < value <= 60.0:
-                raise InputError(f"{name} = {value:g}: must be above 0 and at most 60 s")
-
-    @property
-    def threshold(self) -> float:
-        """H of each test.
-
-        >>> round(WatchSettings(false_alarms=3.0, block_s=1.0).threshold, 3), round(math.log(3600.0), 3)
-        (8.189, 8.189)
-        """
-        return math.log(TESTS * 3600.0 / (self.block_s * self.false_alarms))
-
-
-@dataclass(eq=False)
-class SequentialTest:
-    """The sum c of a test, and the block with which it left 0."""
-
-    threshold: float
-    sum: float = 0.0
-    begin: int = -1
-
-    def add(self, ratio: float, block: int, length: float = 1.0) -> bool:
-        """Add the log-likelihood ratio of a block; whether it raises the alarm, after which the sum is 0.
-
-        Parameters
-        ----------
-        length : of the block over the usual one, at least 1: a longer one counts for up to three
-        """
-        if self.sum == 0.0:
-            self.begin = block
-        self.sum = max(0.0, self.sum + min(ratio, self.threshold / 3.0 * min(length, 3.0)))
-        if self.sum < self.threshold * (1.0 - 1e-12):
-            return False
-        self.sum = 0.0
-        return True
 
 
 @dataclass(eq=False)
