@@ -4,6 +4,7 @@
     python benchmarks/frame.py --state [CELL_MM]  the finished frame, clamped and factored, in cells of 3 mm
     python benchmarks/frame.py --proof FILE       the jobs that `chipload init` drafts of a STEP file, run one by one
     python benchmarks/frame.py --levels MM [MM]   the example `frame` with levels of its walls of these depths
+    python benchmarks/frame.py --plan [SET ...]   the levels that the example plans, with these values in its job
 
 Measured for each size of cells: a plan with a release before finishing, its flatness and distortion. Then the whole
 search of a job: the part at three heights in a plate of 40 mm, either side first, either way up, with and without a
@@ -11,6 +12,9 @@ release before its faces are finished. The stress is the M of stretched plate, 2
 
 The proof runs the commands of a user: `chipload init`, then `chipload run --accept` of each job; of each the exit code,
 the processor and wall time and the greatest memory, and the first sentence of its verdict.
+
+The plan states levels by what is left of the part, their planned form errors, the constant depth that keeps the same
+limit, and its processor time; nothing is simulated.
 
 The levels compare depths of the second operation of the example: time of its program, and the form error that its
 simulation in the elastic part states at 95 %. The greatest depth that holds is the one to use.
@@ -33,6 +37,9 @@ import shapely
 import trimesh
 
 from chipload.jobs import job_of, load_job, run_job
+from chipload.jobs.contour.job import ContourJob
+from chipload.jobs.contour.run import read_inputs
+from chipload.jobs.contour.wall_states import levels_text, planned_levels
 from chipload.jobs.distortion.plans import Clamping, MillingPlan
 from chipload.jobs.distortion.release import plate_release
 from chipload.jobs.distortion.shapes import SideCut
@@ -46,6 +53,8 @@ from chipload.structure.cells.workpiece import Elastic, cell_workpiece, line_com
 from chipload.structure.stress_profile import m_shape, odd_shape
 
 SIZE, WALL, FLOOR = (120.0, 60.0, 30.0), 1.5, 2.0
+#: depth of the pockets of the example [mm]
+WALLS = 8.0
 
 
 def box(low: tuple[float, ...], high: tuple[float, ...]) -> trimesh.Trimesh:
@@ -67,7 +76,8 @@ def print_plan(part: trimesh.Trimesh, cell: float) -> None:
     """One plan in cells of one size: roughed to 1 mm, released, finished."""
     began = process_time()
     profiles = m_shape(SIZE[2], 20.0, 0.6), odd_shape(SIZE[2], 5.0, 0.6)
-    release = plate_release(part, *part.bounds, [1.0], profiles, Elastic(71_700.0, 0.33), cell)
+    low, high = part.bounds
+    release = plate_release(part, low, high, [1.0], profiles, Elastic(71_700.0, 0.33), cell)
     cuts = SideCut("z+", 1.0), SideCut("z+", 0.0)
     plan = MillingPlan(0.0, False, tuple(map(Clamping, cuts)))
     done = release.outcome(plan, part_surface(part, 8.0), 0.5)
@@ -160,7 +170,8 @@ def print_levels(depths: list[float]) -> None:
         roughed = Path(folder) / "roughing"
         for depth in depths:
             # what exceeds is measured too: the engagement of a deep level is that of a shallow one
-            planned = run_job(load_job(job / "job.toml", [f"operation.1.axial_depth_mm={depth}"]))
+            levels = [depth] * int(WALLS // depth) + ([WALLS % depth] if WALLS % depth else [])
+            planned = run_job(load_job(job / "job.toml", [f"operation.1.levels_mm={levels}"]))
             write_finished(planned.result, planned.presentation, programs[0].parent)
             if not roughed.exists():
                 done = run_job(load_job(job / "roughing.toml", [f"program.file={programs[0]}"]))
@@ -177,8 +188,20 @@ def print_levels(depths: list[float]) -> None:
             shutil.rmtree(programs[0].parent)
 
 
+def print_level_plan(sets: list[str]) -> None:
+    """The planned levels of the second operation of the example, with values in its job replaced."""
+    job = load_job(Path(str(files("chipload") / "examples" / "frame")) / "job.toml", sets).job
+    assert isinstance(job, ContourJob)
+    inputs, began = read_inputs(job), process_time()
+    found = planned_levels(job, job.operations[1], inputs.contours, inputs.top, inputs.material)
+    print(f"{levels_text(found, job.limits['form_error_um'])}; {process_time() - began:.1f} s")
+
+
 def main() -> None:
     """Print all measurements."""
+    if sys.argv[1:2] == ["--plan"]:
+        print_level_plan(sys.argv[2:])
+        return
     if sys.argv[1:2] == ["--levels"]:
         print_levels([float(a) for a in sys.argv[2:]])
         return
