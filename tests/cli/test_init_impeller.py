@@ -15,6 +15,7 @@ from chipload.cli.app import app
 from chipload.geometry.bspline import BSplinePatch
 from chipload.geometry.sections import Blade
 from chipload.jobs import check_job, load_job
+from chipload.jobs.drafts.make import draft_of
 from chipload.jobs.impeller.part import read_part
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 
@@ -97,3 +98,17 @@ def test_the_draft_passes_check(tmp_path: Path) -> None:
     lines, _ = check_job(loaded)
     assert any(line.startswith("catalogue draft: ") for line in lines)
     assert any("no cutter is too short" in line for line in lines)
+
+
+def test_the_blades_of_a_blade3d_file_are_those_of_its_input(tmp_path: Path) -> None:
+    """The input of the same case beside it states how many there are; that of another case is not read."""
+    v = np.linspace(0.0, 1.0, 5)
+    rows = np.array([profile(WHEEL.blade, x) for x in v])[..., [2, 0, 1]]
+    lines = [f"{rows.shape[1]} {len(v)}", *(" ".join(f"{x:.8f}" for x in p) for p in rows.reshape(-1, 3))]
+    (tmp_path / "blade3d.mine.dat").write_text("\n".join(lines) + "\n")
+    for name, case, count in (("3dbgbinput.1.dat", "other", 7), ("3dbgbinput.2.dat", "Mine", 11)):
+        (tmp_path / name).write_text(f" Input parameters\n {case}\n Number of blades in this row:\n   {count}\n")
+    draft = draft_of(tmp_path / "blade3d.mine.dat", tmp_path / "job")
+    part, sections = draft.tables[:2]
+    assert (part.entries[0].value, part.entries[0].note, part.entries[0].guess) == (11, "of 3dbgbinput.2.dat", False)
+    assert {e.key: e.value for e in sections.entries}["unit"] == "mm"

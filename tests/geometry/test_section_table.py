@@ -88,3 +88,37 @@ def test_refused_tables(tmp_path):
         read_sections([path], "m")
     with pytest.raises(InputError, match="columns X Y Z: must not be stated: the table names its own"):
         read_sections([write(path, lines)], "m", columns="X Y Z")
+
+
+def blade3d(folder: Path, sections: int = 4, points: int = 41) -> tuple[Path, np.ndarray]:
+    """A blade along x by formula as T-Blade3 writes it, about the axis x, and its points (k, m, 3)."""
+    turn = np.linspace(0.0, 2.0 * np.pi, points)
+    rows = []
+    for k in range(sections):
+        r, th = 40.0 + 10.0 * k, 0.02 * np.sin(turn) + (0.4 + 0.1 * k) * np.cos(turn)
+        rows.append(np.stack([20.0 - 20.0 * np.cos(turn), r * np.sin(th), r * np.cos(th)], axis=-1))
+    p = np.array(rows)
+    p[:, -1] = p[:, 0]
+    lines = [f"{points} {sections}", *(" ".join(f"{x:.12f}" for x in q) for q in p.reshape(-1, 3))]
+    path = folder / "blade3d.case.dat"
+    path.write_text("\n".join(lines) + "\n")
+    return path, p
+
+
+def test_a_blade3d_file_has_its_sections_hub_and_shroud(tmp_path: Path) -> None:
+    path, p = blade3d(tmp_path)
+    found = read_sections([path], "mm")
+    assert [len(q) for q in found] == [40] * 4
+    for a, b in zip(found, p, strict=True):
+        assert a == pytest.approx(b[:-1, [1, 2, 0]], abs=1e-11)
+    for shroud, radius in ((False, 40.0), (True, 70.0)):
+        meridian = read_meridian(path, "mm", shroud=shroud)
+        assert meridian[:, 0] == pytest.approx(radius, abs=1e-9)
+        assert meridian[[0, -1], 1] == pytest.approx([40.0, 0.0], abs=1e-9)
+
+
+def test_a_blade3d_file_without_a_point_is_refused(tmp_path: Path) -> None:
+    path, _ = blade3d(tmp_path)
+    path.write_text("\n".join(path.read_text().splitlines()[:-1]))
+    with pytest.raises(InputError, match=r"case\.dat: 163 points: must be 164: line 1 states 41 points of 4 sections$"):
+        read_sections([path], "mm")

@@ -61,7 +61,7 @@ def gear() -> trimesh.Trimesh:
     """A spur gear: its teeth are not turned about the axis."""
     parts = [trimesh.creation.cylinder(20.0, 12.0, sections=90)]
     for k in range(12):
-        tooth = trimesh.creation.box((8.0, 3.0, 12.0))
+        tooth = trimesh.creation.box((8.0, 3.0, 12.0)).subdivide().subdivide()
         tooth.apply_translation([22.0, 0.0, 0.0])
         tooth.apply_transform(trimesh.transformations.rotation_matrix(2.0 * np.pi * k / 12, [0, 0, 1]))
         parts.append(tooth)

@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
 from chipload.examples import copy_example
-from chipload.geometry.sections import check_sections, loft
+from chipload.geometry.sections import check_sections, loft, read_sections
+from chipload.geometry.step_faces import read_faces
 from chipload.geometry.thin_wall import through_sections
 from chipload.jobs import check_job, load_job, run_job
 from chipload.jobs.impeller.flow import AGAINST_Z
@@ -152,3 +153,14 @@ def test_the_blade_as_a_wall(tmp_path):
         rows = [wall.sides(u[:, 0], np.full(401, height))[0] for height in (0.2, 0.4, 0.6, 0.8)]
         greatest.append([float(other.query(p)[0].max()) for p in rows])
     assert greatest[0] == pytest.approx(greatest[1], rel=0.01)
+
+
+def test_the_points_of_the_rotor_are_its_faces():
+    """The blade through the points that T-Blade3 wrote, against the faces by the CAD kernel's distance."""
+    blade = loft(check_sections(read_sections([ROTOR / "blade3d.Case7-28-8.dat"], "mm")))
+    model = read_faces(ROTOR / "Case_7-28-8_Rotor.step")
+    rng = np.random.default_rng(1)
+    u, v = rng.uniform(0.03, 0.97, 25), rng.uniform(0.02, 0.98, 25)
+    for side in (blade.plus, blade.minus):
+        points = side.at(u, v)[:, [2, 0, 1]].tolist()
+        assert max(min(face.distance(p) for face in model.faces[:2]) for p in points) < 0.03

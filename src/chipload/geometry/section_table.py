@@ -1,9 +1,12 @@
-"""The reader of pyturbo-aero tables, which have all sections of a blade with both sides in one row.
+"""The reader of files that have all sections of a blade: tables of pyturbo-aero, and blade3d files of T-Blade3.
 
 Format: a line of names, ``span_index,ss_x,ss_y,ss_z,ps_x,ps_y,ps_z`` or ``span_index,ss_x,ss_r,ss_th,ps_x,ps_r,ps_th``,
 then, for each section from hub to shroud, one line for each place from leading to trailing edge, with the points of the
 suction side (ss) and of the pressure side (ps). x is along the axis; th [rad] is measured from z towards y. The file
 states no unit.
+
+T-Blade3 writes a line with two whole numbers, the points of a section and the sections, then a line x y z for each
+point, once round each profile from hub to tip; x is along the axis.
 """
 
 from __future__ import annotations
@@ -33,6 +36,9 @@ def sections_of_table(text: str, path: Path) -> tuple[Floats, ...] | None:
     InputError
         A line is not seven finite numbers, or sections are out of order.
     """
+    rings = _rings(text, path)
+    if rings is not None:
+        return rings
     parts = _parts(text, path)
     if parts is None:
         return None
@@ -45,12 +51,17 @@ def meridian_of_table(text: str, path: Path, last: bool) -> Floats | None:
 
     None if the text is not such a table. Raises as :func:`sections_of_table`.
     """
-    parts = _parts(text, path)
+    rings = _rings(text, path)
+    parts = _parts(text, path) if rings is None else [(ring, ring) for ring in rings]
     if parts is None:
         return None
     side = parts[-1 if last else 0][0]
     p = np.stack([np.hypot(side[:, 0], side[:, 1]), side[:, 2]], axis=-1)
-    chord = (p[-1] - p[0]) / np.linalg.norm(p[-1] - p[0])
+    # of a closed section, from one end to the other
+    far = p[np.linalg.norm(p - p[0], axis=1).argmax()]
+    first = p[np.linalg.norm(p - far, axis=1).argmax()] if rings is not None else p[0]
+    chord = (far - first) if rings is not None else (p[-1] - p[0])
+    chord = chord / np.linalg.norm(chord)
     p = p[np.argsort((p - p[0]) @ chord, kind="stable")]
     least = _APART * float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum())
     out = [p[0]]
@@ -58,6 +69,27 @@ def meridian_of_table(text: str, path: Path, last: bool) -> Floats | None:
         if min(np.linalg.norm(point - out[-1]), np.linalg.norm(point - p[-1])) >= least:
             out.append(point)
     return np.array([*out, p[-1]])
+
+
+def is_blade3d(text: str) -> bool:
+    """Whether a text begins as a blade3d file of T-Blade3: with two whole numbers, then three numbers a line."""
+    lines = [line.split() for line in text[:400].splitlines()[:2]]
+    return len(lines) == 2 and len(lines[0]) == 2 and all(w.isdigit() for w in lines[0]) and len(lines[1]) == 3
+
+
+def _rings(text: str, path: Path) -> tuple[Floats, ...] | None:
+    """Closed sections (n, 3) of a blade3d file, z along the axis; None for another file."""
+    if not is_blade3d(text):
+        return None
+    lines = [(k, words) for k, words in enumerate(map(str.split, text.splitlines()), 1) if words]
+    count, rows = (int(w) for w in lines[0][1])
+    if len(lines) - 1 != count * rows:
+        raise InputError(
+            f"{path}: {len(lines) - 1} points: must be {count * rows}: line 1 states {count} points of {rows} sections"
+        )
+    p = np.array([_row(words, path, k, 3) for k, words in lines[1:]]).reshape(rows, count, 3)[..., [1, 2, 0]]
+    closed = np.linalg.norm(p[:, 0] - p[:, -1], axis=1).max() <= 1e-9 * float(np.abs(p).max())
+    return tuple(section[:-1] if closed else section for section in p)
 
 
 def _parts(text: str, path: Path) -> list[tuple[Floats, Floats]] | None:
@@ -80,13 +112,14 @@ def _parts(text: str, path: Path) -> list[tuple[Floats, Floats]] | None:
     return [(_points(s[:, 1:4], names), _points(s[:, 4:], names)) for s in spans]
 
 
-def _row(words: list[str], path: Path, line: int) -> list[float]:
+def _row(words: list[str], path: Path, line: int, count: int = 7) -> list[float]:
     try:
         row = [float(w) for w in words]
     except ValueError:
         raise InputError(f"{path} line {line}: not numbers: {' '.join(words)[:40]!r}") from None
-    if len(row) != 7 or not all(map(math.isfinite, row)):
-        raise InputError(f"{path} line {line}: must be seven finite numbers: {' '.join(words)[:40]!r}")
+    if len(row) != count or not all(map(math.isfinite, row)):
+        number = "three" if count == 3 else "seven"
+        raise InputError(f"{path} line {line}: must be {number} finite numbers: {' '.join(words)[:40]!r}")
     return row
 
 

@@ -7,8 +7,9 @@ u in 0..1 runs along a section from its leading to its trailing edge, v from the
 Formats: tables of three columns, one section per file, whose first line names the columns `X R*THETA R`,
 `X R THETA_DEG` or `X Y Z` (NASA's HECC; X of the first two is along the axis); TurboGrid `.curve` and `.crv` with
 columns x y z and sections separated by lines that begin with #, several blades by lines that begin with ##; tables of
-pyturbo-aero with all sections (``section_table.py``); clouds of points X Y Z that lie on levels, in any order, also
-with their number in front (``point_cloud.py``). The files do not state a unit, so the caller states it.
+pyturbo-aero and blade3d files of T-Blade3 with all sections (``section_table.py``); clouds of points X Y Z that lie on
+levels, in any order, also with their number in front (``point_cloud.py``). The files do not state a unit, so the caller
+states it.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def read_sections(
 ) -> tuple[Floats, ...]:
     """Sections of one blade from files in order from hub to shroud.
 
-    A file of TurboGrid or pyturbo-aero may contain all sections, and so may a cloud of points.
+    A file of TurboGrid or pyturbo-aero or T-Blade3 may contain all sections, and so may a cloud of points.
 
     Parameters
     ----------

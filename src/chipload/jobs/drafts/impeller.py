@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.geometry.blade_thickness import thickness
 from chipload.geometry.bladegen import BladeRow, is_blade_row, read_blade_row
+from chipload.geometry.section_table import is_blade3d
 from chipload.geometry.sections import Blade, check_sections, loft, read_meridian, read_sections
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
 from chipload.lazy import scipy
@@ -45,10 +47,10 @@ def holds_impeller(file: Path) -> bool:
     """Return whether a file describes a blade row, or is a table of all sections of a blade with both sides."""
     if is_blade_row(file):
         return True
-    if file.suffix.lower() != ".csv":
+    if file.suffix.lower() not in (".csv", ".dat"):
         return False
-    head = read_regular(file, file.name, 100_000_000)[:40].decode("utf-8-sig", "replace")
-    return head.lower().startswith("span_index")
+    head = read_regular(file, file.name, 100_000_000)[:400].decode("utf-8-sig", "replace")
+    return head.lower().startswith("span_index") or is_blade3d(head)
 
 
 @dataclass(frozen=True)
@@ -58,13 +60,15 @@ class RowNotes:
     Parameters
     ----------
     blades, unit : of the number of blades and of the unit of length; empty: the file states it
-    guess : whether both are guesses
+    guess : whether the number of blades is a guess
+    unit_guess : whether the unit is one
     found : what else was found in the file
     """
 
     blades: str = ""
     unit: str = ""
     guess: bool = False
+    unit_guess: bool = False
     found: tuple[str, ...] = ()
 
 
@@ -81,7 +85,11 @@ def draft_impeller(file: Path, folder: Path, machine: str | None = None) -> Draf
     else:
         row = _row_of_table(file)
         outer = _outer([_body(row, 0)])
-        notes = RowNotes("the table states none", f"the table names none; the wheel has {outer:.4g} mm", True)
+        stated = _blades_of_case(file)
+        if stated is not None:
+            row = replace(row, blades=stated[0])
+        why = "the table states none" if stated is None else f"of {stated[1]}"
+        notes = RowNotes(why, f"the table names none; the wheel has {outer:.4g} mm", stated is None, unit_guess=True)
     names = {path: relative(path, folder) for path in (row.profile, row.hub, row.shroud)}
     return draft_row(file, row, names, notes, machine)
 
@@ -116,7 +124,7 @@ def draft_row(
         *((Entry("splitter", [profile], "the second blade of the file"),) if row.splitter else ()),
         Entry("hub", names[row.hub]),
         Entry("shroud", names[row.shroud]),
-        Entry("unit", row.unit, notes.unit, notes.guess and bool(notes.unit)),
+        Entry("unit", row.unit, notes.unit, notes.unit_guess),
         *((Entry("axis", row.axis),) if row.axis != "z" else ()),
         Entry("hub_ahead_mm", ahead, "length of the hub before the blades that is milled", True),
     )
@@ -154,6 +162,24 @@ def draft_row(
 def _outer(bodies: list[tuple[Blade, tuple[Floats, ...]]]) -> float:
     """Outer diameter of sections [mm]."""
     return 2.0 * max(float(np.hypot(p[:, 0], p[:, 1]).max()) for _, sections in bodies for p in sections)
+
+
+def _blades_of_case(file: Path) -> tuple[int, str] | None:
+    """Number of blades of a blade3d file by T-Blade3's input of the same case beside it, and its name; None: no input.
+
+    The input, ``3dbgbinput.N.dat``, has the name of the case in its second line.
+    """
+    if file.suffix.lower() != ".dat":
+        return None
+    case = file.stem.split(".", 1)[-1].lower()
+    for other in sorted(file.parent.glob("3dbgbinput*.dat")):
+        lines = read_regular(other, other.name, 10_000_000).decode("utf-8-sig", "replace").splitlines()
+        if len(lines) < 2 or lines[1].strip().lower() != case:
+            continue
+        for title, value in itertools.pairwise(lines):
+            if title.strip().lower().startswith("number of blades") and value.strip().isdigit():
+                return int(value), other.name
+    return None
 
 
 def _row_of_table(file: Path) -> BladeRow:

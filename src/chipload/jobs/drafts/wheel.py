@@ -103,7 +103,7 @@ def _draft_of(file: Path, wheel: WheelBlades, axis: str, why: str, machine: str 
         row = BladeRow(
             wheel.count, len(wheel.bodies) == 2, "mm", axis, paths[PROFILE], paths[HUB], paths[SHROUD]
         )  # fmt: skip
-        notes = RowNotes("of the model", why, bool(why), _deviation_lines(wheel, axis))
+        notes = RowNotes("of the model", why, False, bool(why), _deviation_lines(wheel, axis))
         return draft_row(file, row, {path: key for key, path in paths.items()}, notes, machine, files)
 
 
