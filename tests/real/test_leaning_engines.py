@@ -70,7 +70,7 @@ def held(moves: Removal, layers: Removal, volume: float, force: float, first: in
 def test_the_boat_of_linuxcnc() -> None:
     program = read_program(BOAT, machine_named("xyzac-trunnion"), tolerance=0.01).program
     first = int(np.argmax(np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > 1e-9))
-    some = rows(program, first - 1, 120)
+    some = rows(program, first - 1, 30)
     both = held(*by_both(some, MILL, (-50.0, -27.0, -13.25), (47.0, 23.0, 0.5)), volume=0.01, force=0.15)
     assert both.sum() > 50
 
