@@ -102,7 +102,7 @@ EXAMPLES = {
     "radial_depth_mm": "0.5", "step_mm": "0.5", "layer_mm": "0.5", "force_n": "800.0", "torque_nm": "4.0",
     "power_w": "3000.0", "number": "1", "cutter": "1", "confidence": "0.99", "fastest_percent": "200.0",
     "dynamics.file": '"modes.toml"', "frequency_hz": "812.0", "damping_ratio": "0.02", "stiffness_n_um": "8.0",
-    "mass_kg": "0.3", "least_rpm": "5000.0", "most_rpm": "12000.0", "stability_margin": "1.2",
+    "levels_reserve": "0.3", "mass_kg": "0.3", "least_rpm": "5000.0", "most_rpm": "12000.0", "stability_margin": "1.2",
     "stable_probability": "0.95", "frequency_percent": "2.0", "fit_mm": "0.001", "reserve": "0.1",
     "override_step": "0.01", "spacing_mm": "0.5", "stock_layers": '["STOCK"]', "part.lines": "[120, 180]",
     "part.labels": '["(WALL)", "(WALL END)"]',
