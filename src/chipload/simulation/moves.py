@@ -205,6 +205,14 @@ class MoveRun:
         stock.remove_many([i for i, s in zip(at, shapes, strict=True) if not s.is_empty], [s for s in shapes if s])
         stock.earlier = moves
 
+    def store_moves(self, stock: LayeredStock, workers: int) -> None:
+        """Store the moves with a stock, whose layers stay as they were; finish one whose body is its layers."""
+        if self.stock.body is not stock.part:
+            self.finish(stock, workers)
+            return
+        stock.earlier = moves_of(self.stock)
+        self.stock.forget()
+
     def _levels(self) -> Floats:
         """Return the heights (m,) [mm] at which the stock was cut level."""
         moves = self.stock.moves[: self.stock.count]

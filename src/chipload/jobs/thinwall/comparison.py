@@ -16,11 +16,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.jobs.thinwall.outcome import Finish, Variant
+from chipload.jobs.thinwall.outcome import Finish, Surfaces, Variant
 from chipload.jobs.thinwall.places import Places
 from chipload.lazy import scipy
 from chipload.planning.thinwall.passes import NOTHING, planned_pass
@@ -92,8 +93,14 @@ def compensate_passes(
         one = prove(_move_last_passes(places, planned, shift))
         error = one.finish
         left = tuple(_remaining_error(places, f, shift) for f in one.finish)
-        found.append(replace(one, finish=left, shift=max(float(np.abs(o).max()) for o in shift)))
+        surfaces = partial(_with_finish, one, left)
+        found.append(replace(one, find_surfaces=surfaces, shift=max(float(np.abs(o).max()) for o in shift)))
     return min(found, key=lambda one: one.error)
+
+
+def _with_finish(one: Variant, finish: tuple[Finish, ...]) -> Surfaces:
+    """The surfaces of a variant with other finished sides."""
+    return replace(one.surfaces, finish=finish)
 
 
 def _interpolate(at: tuple[Floats, Floats], values: Floats, to: tuple[Floats, Floats]) -> Floats:

@@ -1,8 +1,8 @@
 """Simulated passes of a thin wall in the checkpoint of a run: a resumed run does not simulate a plan again.
 
-A plan depends on the job and on the plans before it; its key is that of its passes. The error of its loads, which is
-calculated after the simulation, is kept as a part of its own: where only the error is missing, the plan is simulated
-again.
+A plan depends on the job and on the plans before it; its key is that of its passes. What it leaves and the error of its
+loads are calculated after the simulation, where they are needed, and are kept as parts of their own: where only these
+are missing, the plan is simulated again.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chipload.jobs.kept_parts import KeptRecords
 from chipload.jobs.thinwall.job import ThinWallJob
-from chipload.jobs.thinwall.outcome import Finish, Shape
+from chipload.jobs.thinwall.outcome import Finish, Shape, Surfaces
 from chipload.jobs.thinwall.proof import Proof
 from chipload.planning.thinwall.passes import Plan
 from chipload.result import Provenance
@@ -24,7 +24,7 @@ from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.surface import Collision
 
 #: what a part may be made of besides arrays and plain values
-RECORDS = (Collision, Finish, Shape)
+RECORDS = (Collision, Finish, Shape, Surfaces)
 
 
 def kept_of(job: ThinWallJob, checkpoint: Checkpoint | None, provenance: Provenance) -> KeptRecords:
@@ -46,16 +46,15 @@ def kept_proof(keep: KeptRecords, plan: Plan, prove: Callable[[], Proof]) -> Pro
     def tree() -> tuple[Any, ...]:
         proof = simulated()
         columns = {name: _plain(values) for name, values in proof.columns.items()}
-        return columns, proof.thresholds, proof.finish, proof.shape, proof.stress
+        return columns, proof.thresholds
 
-    columns, thresholds, finish, shape, stress = keep(("proof", *key), tree)
+    columns, thresholds = keep(("proof", *key), tree)
     return Proof(
         {name: values.astype(object) if values.dtype.kind == "U" else values for name, values in columns.items()},
         thresholds,
-        finish,
-        shape,
-        stress,
+        lambda: keep(("surfaces", *key), lambda: simulated().find_surfaces()),
         lambda: keep(("error of the loads", *key), lambda: dict(simulated().find_load_error())),
+        made[0].removal if made else None,
     )
 
 

@@ -104,6 +104,22 @@ class Shape:
     collisions: tuple[Collision, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """What a simulation leaves.
+
+    Attributes
+    ----------
+    finish : a finished side each
+    shape : the simulated stock against the finished wall
+    stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
+    """
+
+    finish: tuple[Finish, ...]
+    shape: Shape
+    stress: float
+
+
 @dataclass(frozen=True)
 class Help:
     """A place where even the smallest depth exceeds the threshold, and the changes that would make it feasible."""
@@ -154,10 +170,8 @@ class Variant:
     beyond : what the machine does not give
     seconds : on the machine
     columns : one row for each step of the simulation
-    finish : a finished side each
-    shape : the simulated stock against the finished wall
-    stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
-    find_load_error : calculates ``load_error`` at its first use: it takes longer than the simulation
+    find_surfaces : calculates ``surfaces`` at its first use: of plans that are only tried they are not needed
+    find_load_error : calculates ``load_error`` at its first use
     shift : greatest way [mm] by which the last passes were moved against the form error
     """
 
@@ -168,11 +182,29 @@ class Variant:
     beyond: tuple[Finding, ...]
     seconds: float
     columns: Mapping[str, NDArray[Any]]
-    finish: tuple[Finish, ...]
-    shape: Shape
-    stress: float
+    find_surfaces: Callable[[], Surfaces]
     find_load_error: Callable[[], Mapping[str, float]]
     shift: float = 0.0
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """What the simulation leaves."""
+        return self.find_surfaces()
+
+    @property
+    def finish(self) -> tuple[Finish, ...]:
+        """A finished side each."""
+        return self.surfaces.finish
+
+    @property
+    def shape(self) -> Shape:
+        """The simulated stock against the finished wall."""
+        return self.surfaces.shape
+
+    @property
+    def stress(self) -> float:
+        """Greatest equivalent stress at the clamp [MPa] under the simulated forces."""
+        return self.surfaces.stress
 
     @cached_property
     def load_error(self) -> Mapping[str, float]:

@@ -98,10 +98,11 @@ def with_lines_of_text(one: Variant, reading: ProgramReading | None) -> Variant:
         return int(of_text(np.array([line]))[0]) if line else 0
 
     touched = tuple(replace(c, line=line_in_text(c.line)) for c in one.shape.collisions)
+    surfaces = replace(one.surfaces, shape=replace(one.shape, collisions=touched))
     return replace(
         one,
         columns={**one.columns, "line": of_text(np.asarray(one.columns["line"], dtype=np.int64))},
-        shape=replace(one.shape, collisions=touched),
+        find_surfaces=lambda: surfaces,
         beyond=tuple(replace(f, line=line_in_text(f.line)) for f in one.beyond),
     )
 

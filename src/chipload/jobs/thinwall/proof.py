@@ -25,7 +25,7 @@ from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.load_error import load_error
 from chipload.jobs.thinwall.mesh_error import error_at
 from chipload.jobs.thinwall.neighbours import part_collisions, wall_collisions
-from chipload.jobs.thinwall.outcome import Finish, Shape
+from chipload.jobs.thinwall.outcome import Finish, Shape, Surfaces
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.places import Places, interpolate_places
 from chipload.lazy import scipy
@@ -34,8 +34,9 @@ from chipload.planning.thinwall.pass_program import PassProgram
 from chipload.planning.thinwall.passes import Plan
 from chipload.program.program import Program
 from chipload.progress import Progress
-from chipload.simulation.chips import remove, stack_blocks
+from chipload.simulation.chips import stack_blocks
 from chipload.simulation.contact_points import touch_points
+from chipload.simulation.continued import KnownRemoval, remove_from
 from chipload.simulation.deflection import Contacts, form_error, step_deflections
 from chipload.simulation.initial_stock import initial_stock
 from chipload.simulation.removal import Removal, Resolution, removal_between
@@ -74,17 +75,26 @@ class Proof:
     ----------
     columns : one row for each step, all passes one after another
     thresholds : (n, m) [N] a pass, at the places of its side
-    finish, shape : of the finished wall
-    stress : greatest equivalent stress at the clamp [MPa]
+    find_surfaces : gives what the plan leaves
     find_load_error : gives the relative error of the loads by column, of layers and steps
+    removal : of the simulation, from which a plan that begins alike continues; None: it is not kept
     """
 
     columns: Mapping[str, NDArray[Any]]
     thresholds: tuple[Floats, ...]
-    finish: tuple[Finish, ...]
-    shape: Shape
-    stress: float
+    find_surfaces: Callable[[], Surfaces]
     find_load_error: Callable[[], Mapping[str, float]]
+    removal: KnownRemoval | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _CutPass:
+    """A pass as it was simulated: its columns, the stock that it leaves on all sides, and its removal."""
+
+    side: int
+    left: tuple[Floats, ...]
+    columns: Mapping[str, NDArray[Any]]
+    removal: Removal
 
 
 def resolution_of(inputs: WallInputs, program: Program) -> Resolution:
@@ -106,6 +116,7 @@ def prove(
     times: Floats,
     progress: Progress,
     read: Program | None = None,
+    before: KnownRemoval | None = None,
 ) -> Proof:
     """Simulate the program of all passes of a plan from the uncut stock.
 
@@ -113,28 +124,23 @@ def prove(
     ----------
     times : (n,) float [s], time of each row of the program on the machine
     read : the program as its text is read back, with the lines of ``pass_programs``; None: it is simulated as planned
+    before : the removal of another plan, whose first passes are not simulated again where they are those of this one
     """
     inputs = places.inputs
     stock, program = places.uncut.copied(), read or Program.join([one.program for one in pass_programs])
     fine, cutters = resolution_of(inputs, program), {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
-    whole = remove(
-        program, stock, cutters, inputs.cut.material, fine, keep=True, accuracy=False, times=times,
-        progress=progress,
-    )  # fmt: skip
+    known = remove_from(before, program, stock, cutters, inputs.cut.material, fine, times, progress)
+    whole = known.removal
     bars = {number: tool_bars(cutter) for number, cutter in cutters.items()}
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]
-    parts: list[dict[str, NDArray[Any]]] = []
+    cut: list[_CutPass] = []
     thresholds: list[Floats] = []
-    finish: dict[int, Finish] = {}
-    stress = 0.0
-    last = {p.side: k for k, p in enumerate(plan.passes)}
-    for k, (p, pass_program, removal) in enumerate(
-        zip(plan.passes, pass_programs, removals_of_passes(whole, pass_programs), strict=True)
+    for p, pass_program, removal in zip(
+        plan.passes, pass_programs, removals_of_passes(whole, pass_programs), strict=True
     ):
         rules = inputs.operations[p.operation].depths
         left[p.side] = p.low
-        number = inputs.body.side_numbers[p.side]
-        floor = inputs.floor(number) is not None
+        floor = inputs.floor(inputs.body.side_numbers[p.side]) is not None
         C = places.compliance(left, p.side)
         F_th = places.threshold(inputs.depths.deflection, 1.0, spare=False)(left, p.side).force.reshape(places.shape)
         thresholds.append(F_th)
@@ -148,24 +154,40 @@ def prove(
         if places.chatter is not None:
             columns |= places.chatter.columns(places, removal, p, left, columns)
         columns["pass"] = np.full(len(columns["t_s"]), pass_program.program.labels[0], dtype=object)
-        parts.append(columns)
-        stress = max(stress, _stress(inputs, places.coarse(left), number, columns))
-        if k == last[p.side]:
-            finish[number] = (
-                floor_finish(places, removal, left, p.side, error)
-                if floor
-                else _finish(inputs, removal, number, places.compliance(left, p.side, of_surface=True), error, bars)
-            )
+        cut.append(_CutPass(p.side, tuple(left), columns, removal))
     floors = any(inputs.floor(number) is not None for number in inputs.body.side_numbers)
-    find = partial(load_error, program, places.uncut, whole, cutters, inputs.cut.material, fine, floors=floors)
     return Proof(
-        stack_blocks(parts),
+        stack_blocks([one.columns for one in cut]),
         tuple(thresholds),
-        tuple(finish.values()),
-        _shape(places, stock, pass_programs, program),
-        stress,
-        find,
+        partial(_surfaces, places, cut, bars, stock, pass_programs, program),
+        partial(load_error, program, places.uncut, whole, cutters, inputs.cut.material, fine, floors=floors),
+        known,
     )
+
+
+def _surfaces(
+    places: Places,
+    cut: Sequence[_CutPass],
+    bars: Mapping[int, Any],
+    stock: LayeredStock,
+    pass_programs: Sequence[PassProgram],
+    program: Program,
+) -> Surfaces:
+    """What the passes of a plan leave."""
+    inputs, finish, stress = places.inputs, dict[int, Finish](), 0.0
+    last = {one.side: k for k, one in enumerate(cut)}
+    for k, one in enumerate(cut):
+        number = inputs.body.side_numbers[one.side]
+        stress = max(stress, _stress(inputs, places.coarse(one.left), number, one.columns))
+        if k != last[one.side]:
+            continue
+        error = places.error(one.side)
+        if inputs.floor(number) is not None:
+            finish[number] = floor_finish(places, one.removal, one.left, one.side, error)
+        else:
+            C = places.compliance(one.left, one.side, of_surface=True)
+            finish[number] = _finish(inputs, one.removal, number, C, error, bars)
+    return Surfaces(tuple(finish.values()), _shape(places, stock, pass_programs, program), stress)
 
 
 def removals_of_passes(whole: Removal, pass_programs: Sequence[PassProgram]) -> list[Removal]:

@@ -26,6 +26,7 @@ from chipload.planning.thinwall.variants import DepthOperation, even, limited_to
 from chipload.planning.thinwall.variants import PlannedVariant as Planned
 from chipload.program.program import Program
 from chipload.progress import Progress
+from chipload.simulation.continued import KnownRemoval
 
 Floats = NDArray[np.float64]
 #: of the forces of each operation, side by side, (n, m) at the places
@@ -49,7 +50,9 @@ CONSTANTS = 3
 
 
 class Tried:
-    """Plans that are simulated one after another, with their progress."""
+    """Plans that are simulated one after another, with their progress; those that begin as the variable one, as far as
+    it is found, continue from its simulation.
+    """
 
     def __init__(self, places: Places, progress: Progress, keep: KeptRecords | None = None) -> None:
         self.places, self.progress = places, progress
@@ -60,6 +63,8 @@ class Tried:
         self.proved: list[tuple[Program, Planned, tuple[PassProgram, ...]]] = []
         self.corrections: Corrections = ()
         self.share = 1.0
+        self.last: KnownRemoval | None = None
+        self.first_passes: KnownRemoval | None = None
         self._written: list[tuple[Sequence[WallPass], tuple[Program, tuple[PassProgram, ...], OnMachine]]] = []
 
     def written(self, planned: Planned) -> tuple[Program, tuple[PassProgram, ...], OnMachine]:
@@ -93,8 +98,10 @@ class Tried:
                 pass_programs,
                 run.times,
                 lambda p, w: self.progress(low + width * p, f"{name}: {w}"),
+                before=self.first_passes,
             ),
         )
+        self.last = proof.removal
         self.done = low + width
         self.proved.append((program, planned, pass_programs))
         return _variant(self.places, planned, program, run, proof)
@@ -232,6 +239,7 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
         over, good = _overload(one, modelled, assumed)
         if good and (best is None or one.seconds < best.seconds):
             best, tried.planned["variable"], tried.corrections, tried.share = one, planned, corrections, share
+            tried.first_passes = tried.last
             if not refine:
                 break
         elif not good:
@@ -250,6 +258,7 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
     if best is not None:
         return best
     tried.planned["variable"], tried.corrections, tried.share = planned, corrections, share
+    tried.first_passes = tried.last
     return least[0][1]
 
 
@@ -339,9 +348,7 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
         run.exceeding,
         float(run.times.sum()),
         proof.columns,
-        proof.finish,
-        proof.shape,
-        proof.stress,
+        proof.find_surfaces,
         proof.find_load_error,
     )
 
