@@ -69,7 +69,10 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
     keep = kept_of(job, checkpoint, provenance)
     tried = Tried(places_of(inputs, keep), progress, keep)
     free = tried.prove(unlimited_plan(tried.places), 0.25)
+    # kept before the next plan begins: a resumed run would simulate this one again for it
+    free.find_surfaces()
     constant, corrections = constant_within(tried, free)
+    constant.find_surfaces()
     variable = variable_within(tried, corrections, constant)
     made = {"variable": variable, "constant": constant, "unconstrained": free}
     made |= compared_variants(tried, variable, constant)
