@@ -19,7 +19,7 @@ from slot_job import slot_job, slot_text
 
 
 def rows_of(command: str) -> tuple[list[str], dict[str, dict[str, str]]]:
-    code, said, _ = call(command)
+    code, said, _ = call(command, "--tabs")
     assert code == 0
     head, *rows = csv.reader(io.StringIO(said), delimiter="\t", quoting=csv.QUOTE_NONE)
     assert all(len(row) == len(head) for row in rows)
@@ -70,7 +70,7 @@ def test_a_material_in_full() -> None:
 
 
 def test_cutters_and_examples() -> None:
-    code, said, _ = call("cutters")
+    code, said, _ = call("cutters", "--tabs")
     assert code == 0
     assert "wu2019\t10..80\t2\t36\t" in said
     _, found = rows_of("examples")
@@ -151,6 +151,20 @@ def test_a_coarse_run_says_so(tmp_path: Path) -> None:
     assert sizes[1] < 0.5 * sizes[0]
     torque = [next(c["worst"] for c in s["limits"] if c["name"] == "torque_nm") for s in (fine, coarse)]
     assert torque[1] == pytest.approx(torque[0], rel=0.1)
+
+
+@pytest.mark.parametrize("command", ["machines", "materials", "cutters", "examples"])
+def test_a_pipe_gets_names_and_sources_whole_in_80_columns(command, monkeypatch) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    code, said, _ = call(command)
+    assert code == 0
+    lines = [line.rstrip() for line in said.splitlines()]
+    assert max(map(len, lines)) <= 80
+    listing = LISTINGS[command]()
+    text = " ".join(said.split())
+    assert all(any(line == row[0] or line.startswith(f"{row[0]} ") for line in lines) for row in listing.rows)
+    if len(listing.head) > 3:
+        assert all(" ".join(row[-1].split()) in text for row in listing.rows)
 
 
 @pytest.mark.parametrize("width", [60, 80])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +14,7 @@ from chipload.terminal import plain, run_guarded, show
 if TYPE_CHECKING:
     from chipload.jobs.shipped import Listing
 
+Tabs = Annotated[bool, typer.Option("--tabs", help="a line a row, its cells apart by tabs, for another program")]
 #: a table of so few columns is folded into any width
 FEW = 3
 
@@ -22,10 +22,11 @@ FEW = 3
 @app.command()
 def machines(
     name: Annotated[str, typer.Argument(help="machine to show in full", autocompletion=machine_completions)] = "",
+    tabs: Tabs = False,
     debug: Debug = False,
 ) -> None:
     """List the machines that come with chipload: axes, travel, feed, spindle, source of the numbers."""
-    run_guarded(lambda: _shown_machine(name) if name else _show_entry("machines"), debug)
+    run_guarded(lambda: _shown_machine(name) if name else _show_entry("machines", tabs), debug)
 
 
 @app.command()
@@ -36,22 +37,23 @@ def materials(
             help="material to show in full: what each check proves with it", autocompletion=material_completions
         ),
     ] = "",
+    tabs: Tabs = False,
     debug: Debug = False,
 ) -> None:
     """List the materials that come with chipload: coefficients, range, spread, what they prove, source."""
-    run_guarded(lambda: _shown_material(name) if name else _show_entry("materials"), debug)
+    run_guarded(lambda: _shown_material(name) if name else _show_entry("materials", tabs), debug)
 
 
 @app.command()
-def cutters(debug: Debug = False) -> None:
+def cutters(tabs: Tabs = False, debug: Debug = False) -> None:
     """List the cutter catalogues that come with chipload; a job states its cutters or names a tool library."""
-    run_guarded(lambda: _show_entry("cutters"), debug)
+    run_guarded(lambda: _show_entry("cutters", tabs), debug)
 
 
 @app.command()
-def examples(debug: Debug = False) -> None:
+def examples(tabs: Tabs = False, debug: Debug = False) -> None:
     """List the examples. `chipload example NAME DIR` copies one."""
-    run_guarded(lambda: _show_entry("examples"), debug)
+    run_guarded(lambda: _show_entry("examples", tabs), debug)
 
 
 def _shown_machine(name: str) -> int:
@@ -76,20 +78,22 @@ def _shown_material(name: str) -> int:
     return 0
 
 
-def _show_entry(name: str) -> int:
+def _show_entry(name: str, tabs: bool) -> int:
     from chipload.jobs.shipped import LISTINGS
 
     listing = LISTINGS[name]()
-    if sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
-        _rich(listing)
-    else:
+    if tabs:
         for row in (listing.head, *listing.rows):
             show("\t".join(" ".join(cell.split()) for cell in row))
+    else:
+        _show_table(listing)
     return 0
 
 
-def _rich(listing: Listing) -> None:
-    """The table in the width of the terminal, or an entry of a few lines for each row where it does not fit."""
+def _show_table(listing: Listing) -> None:
+    """The table in the width of the terminal, 80 columns in a pipe, or an entry of a few lines for each row where it
+    does not fit.
+    """
     from rich.console import Console
     from rich.measure import Measurement
     from rich.table import Table
@@ -103,14 +107,14 @@ def _rich(listing: Listing) -> None:
     if len(listing.head) <= FEW or wanted <= console.width:
         console.print(table, markup=False)
         return
-    for line in entry_lines(listing, console.width):
+    for line in entry_lines(listing, console.width, whole=not sys.stdout.isatty()):
         show(plain(line))
 
 
-def entry_lines(listing: Listing, width: int) -> list[str]:
+def entry_lines(listing: Listing, width: int, *, whole: bool = False) -> list[str]:
     """Lines of at most ``width`` characters: the first cell of each row, below it the others with their units.
 
-    The last cell, the source, has a line of its own, cut off where it is longer; in a pipe it is whole.
+    The last cell, the source, has a line of its own, cut off where it is longer; ``whole``: it has all its lines.
     """
     from textwrap import shorten, wrap
 
@@ -119,5 +123,9 @@ def entry_lines(listing: Listing, width: int) -> list[str]:
         known = [(head.partition(" ["), cell) for head, cell in zip(listing.head[1:-1], cells, strict=True) if cell]
         texts = [f"{label} {cell}{f' {unit[:-1]}' if unit else ''}" for (label, _, unit), cell in known]
         out += [name, *wrap(", ".join(texts), width, initial_indent="    ", subsequent_indent="    ")]
-        out.append("    " + shorten(f"{listing.head[-1]}: {source}", width - 4, placeholder=" ..."))
+        text = f"{listing.head[-1]}: {source}"
+        if whole:
+            out += wrap(text, width, initial_indent="    ", subsequent_indent="      ", break_on_hyphens=False)
+        else:
+            out.append("    " + shorten(text, width - 4, placeholder=" ..."))
     return out
