@@ -123,9 +123,12 @@ def _scene(
 
 
 def _shown_tracks(result: Result) -> list[tuple[int, Track, dict[str, NDArray[Any]]]]:
-    """Number, track and columns of the tracks in use that have a place; where none has, of the first that has."""
+    """Number, track and columns of the tracks in use that have a place, the one of the critical limit first; where none
+    has, of the first that has.
+    """
     out: list[tuple[int, Track, dict[str, NDArray[Any]]]] = []
-    for k, track in sorted(enumerate(result.tracks), key=lambda item: not item[1].in_use):
+    critical = result.critical_program
+    for k, track in sorted(enumerate(result.tracks), key=lambda item: (not item[1].in_use, item[1].name != critical)):
         if out and not track.in_use:
             break
         columns = _columns(track)
