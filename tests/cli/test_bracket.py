@@ -27,7 +27,7 @@ def test_the_corrected_program_holds(folder: Path, tmp_path: Path) -> None:
     code, out, err = call("run", folder / "job.toml", "--out", tmp_path / "r", *sets)
     assert (code, err) == (0, "")
     # the first line states the limit with the least margin: in line 30 a bent cutter leaves the wall 15.2 um off
-    assert out.startswith("Holds at 95 %: form error 15.21 + 1.7 of 20 µm, margin 15.5 %, in line 30 at ")
+    assert out.startswith("Holds at 95 %: form error 15.2 + 1.7 of 20 µm, margin 15.5 %, in line 30 at ")
     summary = summary_of(tmp_path / "r")
     op, (track,) = summary["operations"][0], summary["tracks"]
     assert (summary["verdict"], track["findings"], op["collisions"]) == ("holds", [], [])

@@ -53,7 +53,7 @@ def test_a_job_that_holds_ends_with_0(job_dir: Path, tmp_path: Path, planned: ob
     code, out, err = call("run", job_dir / "job.toml", "--out", tmp_path / "r")
     assert (code, err) == (0, "")
     assert out.splitlines()[0].startswith(
-        "Holds: engagement 12.68 of 13 deg in the finish pass, margin 2.48 %, at (5, 8.006, -5)."
+        "Holds: engagement 12.7 of 13 deg in the finish pass, margin 2.48 %, at (5, 8.01, -5)."
     )
     assert out.splitlines()[1].startswith("Not checked: ")
     assert out.splitlines()[2] == f"report: {tmp_path / 'r' / 'report.html'}"

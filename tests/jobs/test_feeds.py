@@ -230,7 +230,7 @@ def test_lines_that_would_rub_are_listed(tmp_path: Path) -> None:
     )
     assert rubs.outcome.feeds.rubs == ((6, pytest.approx(0.02)),)
     assert rubs.result.verdict is Verdict.EXCEEDS
-    first = "Exceeds: line 6: feed per tooth 0.02 mm is less than 0.05 mm. Critical limit: force 132.4 of 620 N, "
+    first = "Exceeds: line 6: feed per tooth 0.02 mm is less than 0.05 mm. Critical limit: force 132 of 620 N, "
     assert rubs.result.message.startswith(first)
 
 

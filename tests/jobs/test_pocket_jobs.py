@@ -204,5 +204,5 @@ def test_refused(tmp_path, more, drawn, part, text):
 
 def test_no_engagement_holds(tmp_path):
     path = written(tmp_path, {"part": [SQUARE]}, operation('engagement_deg = "limit"'), limits="force_xy_n = 5.0")
-    with pytest.raises(InputError, match=r"no engagement from 2 deg keeps the limits: force_xy_n 16.26 of 5: lower"):
+    with pytest.raises(InputError, match=r"no engagement from 2 deg keeps the limits: force_xy_n 16.3 of 5: lower"):
         checked(path)

@@ -77,11 +77,11 @@ def test_the_verdict_stands_on_the_strategy_in_use(outcome: Maker) -> None:
     # the engagement counts where the wall is made, the force everywhere: the semi-finish pass has 95 N
     assert verdict(outcome("backward")) == (
         Verdict.HOLDS,
-        "Holds: engagement 12.68 of 13 deg in the finish pass, margin 2.48 %, at (5, 8.006, -5).",
+        "Holds: engagement 12.7 of 13 deg in the finish pass, margin 2.48 %, at (5, 8.01, -5).",
     )
     assert verdict(outcome("plain")) == (
         Verdict.EXCEEDS,
-        "Exceeds: engagement 18.74 deg exceeds 13 deg at (5, 7.957, -5), 44.1 % beyond the limit.",
+        "Exceeds: engagement 18.7 deg exceeds 13 deg at (5, 7.96, -5), 44.1 % beyond the limit.",
     )
 
 
@@ -251,7 +251,7 @@ def test_the_page_states_the_verdict_before_all_else(outcome: Maker) -> None:
     body = html[html.index("<main>") :]
     order = [
         "<b>exceeds</b>",
-        "engagement 18.74 deg exceeds 13 deg",
+        "engagement 18.7 deg exceeds 13 deg",
         "<h2>Not checked",
         "<details open><summary><h2>Limits",
         "<details><summary><h2>Strategies",
@@ -302,7 +302,7 @@ def test_the_table_of_limits_has_the_numbers_of_the_result(outcome: Maker) -> No
     table = html[html.index("<h2>Limits</h2>") :]
     rows = re.findall(r"<tr(?! class=.more).*?</tr>", table[: table.index("</table>")])[1:]
     cells = [[re.sub("<[^>]*>", "", c) for c in re.findall(r"<td[^>]*>(.*?)</td>", row)] for row in rows]
-    wanted = {(t.name, c.column.title, c.state.value, f"{c.limit:g}", f"{c.worst:.4g}")
+    wanted = {(t.name, c.column.title, c.state.value, f"{c.limit:g}", f"{c.worst:.3g}")
               for t in result_of(made).tracks for c in t.limits}  # fmt: skip
     assert {(c[0].removesuffix(" in use"), *c[1:5]) for c in cells} == wanted
     assert len(cells) == 6

@@ -24,7 +24,7 @@ def test_the_html_has_the_message_every_limit_and_every_track(result):
     assert found.count("<tr><td") == len(result.limits) + len(result.tracks) > 3
     assert result.verdict.value.capitalize() in found
     for check in result.limits:
-        assert f"{check.worst:.4g}" in found
+        assert f"{check.worst:.3g}" in found
 
 
 def test_the_html_shows_some_findings_and_counts_the_others(result):

@@ -84,7 +84,7 @@ def test_a_check_refuses_an_error_below_zero_and_a_missing_value_that_holds():
 @pytest.mark.parametrize(
     ("check", "text"),
     [
-        (LimitCheck("force_n", 500.0, 412.345, H, resolution_error=0.0), "force 412.3 of 500 N"),
+        (LimitCheck("force_n", 500.0, 412.345, H, resolution_error=0.0), "force 412 of 500 N"),
         (LimitCheck("force_n", 500.0, 812.0, E, line=12), "force 812 N exceeds 500 N in line 12"),
         (
             LimitCheck("gouge_mm", 0.02, 0.05, E, place=(1.0, -2.5, 3.0)),

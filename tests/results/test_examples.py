@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from chipload.cli import app
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named
-from chipload.number_text import number_text
+from chipload.number_text import number_text, worst_text
 from chipload.program.read import line_times, read_program, read_tools
 from chipload.report.page import HEADINGS, WHOLE
 from chipload.result import COLUMNS, Verdict
@@ -121,7 +121,7 @@ def test_numbers_of_the_message_are_those_of_the_limits(example, name):
     done = example(name)
     result = done.result
     known = [c for c in result.limits if c.worst is not None]
-    named = {c: (c.column.label, number_text(c.worst), number_text(c.limit, 6)) for c in known}
+    named = {c: (c.column.label, worst_text(c.worst, c.limit), number_text(c.limit, 6)) for c in known}
     labels = "|".join(sorted({re.escape(label) for label, *_ in named.values()}, key=len, reverse=True))
     said = re.findall(
         rf"(?:^|[:;,] )({labels}) ([\d.e+-]+)(?: [+-] [\d.e]+)?"
@@ -154,7 +154,7 @@ def test_the_report_lists_every_limit_with_its_numbers(example, name):
     folded = {t.name for t in done.result.tracks if len(done.result.tracks) > WHOLE and not t.in_use}
     expected = [
         (t.name + (" in use" if t.in_use else ""), c.column.title, c.state.value, number_text(c.limit, 6),
-         "not known" if c.worst is None else number_text(c.worst))
+         "not known" if c.worst is None else worst_text(c.worst, c.limit))
         for t, c in checks
         if t.name not in folded or c.state is not Verdict.HOLDS
     ]  # fmt: skip
@@ -221,8 +221,8 @@ def test_one_clock(example, name):
             minutes = float(re.search(r" ([0-9.e+-]+) min; ", report)[1])
             assert 60.0 * minutes == pytest.approx(track.time_s, rel=CLOSE)
         else:
-            most = "" if track.time_high_s is None else f" to {track.time_high_s:.5g}"
-            assert f"{track.time_s:.5g}{most}" in shown
+            most = "" if track.time_high_s is None else f" to {number_text(track.time_high_s)}"
+            assert f"{number_text(track.time_s)}{most}" in shown
         if model.rows:
             assert page[track.name][-1] == pytest.approx(track.time_s, rel=CLOSE)
         if track.programs and done.result.capability not in OVERRIDDEN:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from page_values import SOURCES
 
-from chipload.number_text import number_text
+from chipload.number_text import number_text, worst_text
 from chipload.result import Result, load_result
 from results.test_examples import NAMES
 from web_served import Served
@@ -67,7 +67,7 @@ def test_the_page_states_what_the_summary_states(example, browser, served, name)
             expected = [
                 (
                     check.column.label + ("" if check.coverage.whole else f", {check.coverage.name}"),
-                    "not known" if c["worst"] is None else number_text(c["worst"]),
+                    "not known" if c["worst"] is None else worst_text(c["worst"], c["limit"]),
                     f"{'≥ ' if check.column.least else ''}{number_text(c['limit'], 6)} {c['unit']}".strip(),
                     c["state"],
                 )

@@ -145,7 +145,7 @@ def test_two_views_and_two_lines_stand_together(compared) -> None:
     assert tips[0] == pytest.approx(tips[1])
     # the scale of colours is one: from the least to the greatest of both
     ends = [e.split() for e in page.locator(".cv-ends").all_inner_texts()]
-    assert ends == [[f"{FORCE.min() / 2.0:.4g}", "900"]] * 2
+    assert ends == [[f"{FORCE.min() / 2.0:.3g}", "900"]] * 2
     cameras = page.evaluate(f"{VIEW}.look('top'); [{VIEW}, {SECOND}].map(v => v.camera.position.toArray())")
     assert cameras[0] == pytest.approx(cameras[1])
     page.locator(".cl-plots").get_by_text("time", exact=True).last.click()

@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from chipload.cli import app
-from chipload.number_text import number_text
+from chipload.number_text import number_text, worst_text
 from chipload.result import Verdict, load_result
 from square import two_variants, write_by_hand
 from web_lists import VIEW, press_until
@@ -126,8 +126,8 @@ def rows_of(text: str) -> list[list[str]]:
     return [[html.unescape(re.sub("<[^>]*>", "", c)) for c in re.findall(r"<td[^>]*>(.*?)</td>", r)] for r in rows]
 
 
-def number(value: float | None) -> str:
-    return "not known" if value is None else number_text(value)
+def number(value: float | None, limit: float) -> str:
+    return "not known" if value is None else worst_text(value, limit)
 
 
 @pytest.mark.parametrize("name", RUNS)
@@ -175,7 +175,7 @@ def test_every_limit_of_the_job_stands_in_summary_and_report(opened, name: str) 
     checks = {c.name: c for t in load_result(folder).tracks for c in t.limits}
     wanted = [
         (t["name"] + (" in use" if t["in_use"] else ""), checks[c["name"]].column.title, c["state"],
-         number_text(c["limit"], 6), number(c["worst"]))
+         number_text(c["limit"], 6), number(c["worst"], c["limit"]))
         for t in summary["tracks"] for c in t["limits"]
     ]  # fmt: skip
     assert sorted(tuple(r[:5]) for r in rows_of(text)) == sorted(wanted)
@@ -200,7 +200,7 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
         assert len(t) == track["rows"]
         assert (np.diff(t) >= 0.0).all()
         assert t[-1] == pytest.approx(track["time_s"], rel=1e-3)
-        ends = f" of {t[-1]:.5g} s \u00b7 step 1 of {len(t)}"
+        ends = f" of {t[-1]:.2f} s \u00b7 step 1 of {len(t)}"
         press_until(page, "Home", "e => document.querySelector('.cl-where').textContent.includes(e)", ends)
         if len(tracks) > 1:
             page.wait_for_function(SHOWN, arg=track["name"])
@@ -210,7 +210,7 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
         wanted = [
             (
                 checks[track["name"], c["name"]],
-                number(c["worst"]),
+                number(c["worst"], c["limit"]),
                 f"{c['limit']:g} {c['unit']}".strip(),
                 c["state"],
             )
@@ -231,6 +231,8 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
         for finding in track["findings"]:
             if finding["severity"] != "note":
                 assert any(finding["text"] in text for text in found)
+                colour = {"unproven": "cl-may", "exceeds": "cl-no"}[finding["severity"]]
+                assert page.locator(f".cl-found .{colour}").filter(has_text=finding["text"]).count()
 
 
 def test_the_failing_variant_shows_its_failure(opened, page_of) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chipload.number_text import number_text
 from chipload.result import Track, TrackKind, in_memory
 from square import FEED, FORCE, LINE, ROWS, T, X, Y, square_result, write_by_hand
 from web_lists import VIEW, choose, click_until, drawn, play_slowly, serious_problems, settle, stop
@@ -39,7 +40,7 @@ def stands_at(page, row):
     assert f"line {LINE[row]}" in said
     slider(page, T[row])
     texts = page.evaluate("document.querySelector('.cl-figure').layout.annotations.map(a => a.text)")
-    assert f"{FORCE[row]:.5g}" in texts[0]
+    assert number_text(FORCE[row]) in texts[0]
     assert cutter(page) == pytest.approx([X[row], Y[row], -2.0])
 
 
@@ -183,7 +184,7 @@ def test_the_scene_is_not_blank_and_a_column_changes_its_colours(square, pixels)
     assert page.inner_text(".cv-red") == "red and thick: above 800"
     red = ((before[..., 0] > 170) & (before[..., 1] < 60) & (before[..., 2] < 60)).sum()
     assert red > 20
-    assert page.inner_text(".cv-ends").split() == [f"{FORCE.min():.4g}", f"{FORCE.max():.4g}"]
+    assert page.inner_text(".cv-ends").split() == [f"{FORCE.min():.3g}", f"{FORCE.max():.3g}"]
     choose(page, "path coloured by", "feed [mm/min]")
     page.wait_for_function("document.querySelector('.cv-title').textContent.includes('feed')")
     # the keys are the page's again after a list was open
@@ -191,7 +192,7 @@ def test_the_scene_is_not_blank_and_a_column_changes_its_colours(square, pixels)
     settle(page, 1)
     page.keyboard.press("Home")
     settle(page, 0)
-    assert page.inner_text(".cv-ends").split() == [f"{FEED.min():.4g}", f"{FEED.max():.4g}"]
+    assert page.inner_text(".cv-ends").split() == [f"{FEED.min():.3g}", f"{FEED.max():.3g}"]
     after = scene_pixels(page, pixels)
     assert (np.abs(after.astype(int) - before).max(axis=2) > 40).sum() > 200
     for name in ("stock", "path", "cutter"):

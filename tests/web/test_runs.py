@@ -78,7 +78,7 @@ def test_a_job_is_refused_run_shown_and_stopped(window, folder) -> None:
     assert page.inner_text(".cl-message") == summary["message"]
     first = next(x for x in summary["limits"] if x["name"] == "engagement_deg")
     row = page.locator(".cl-checks tbody tr", has_text="engagement")
-    assert f"{first['worst']:.4g}" in row.inner_text()
+    assert f"{first['worst']:.3g}" in row.inner_text()
     page.wait_for_selector(".cl-now")
     assert page.inner_text(".cl-file") == "0-backward.ngc"
     wait(lambda: not workers(job))

@@ -186,12 +186,12 @@ export class CutPanel {
       return { name: t < 0 ? "each tooth" : `tooth ${t + 1}`, colour: COLOURS[Math.max(t, 0) % COLOURS.length], x: angle, y: angle.map((_, k) => 1000 * p[k % COUNT]) };
     });
     const part = (n: number) => Array.from({ length: m }, (_, k) => s.turn[4 * k + n]), bounds = teeth.bounds;
-    const limit = (name: string, unit: string): [number, string][] => (name in bounds ? [[bounds[name], `limit ${number(bounds[name])} ${unit}`]] : []);
+    const limit = (name: string, unit: string): [number, string][] => (name in bounds ? [[bounds[name], `limit ${number(bounds[name], 6)} ${unit}`]] : []);
     const over = "rotation [\u00b0]", along: Series[] = ["Fx", "Fy", "Fz"].map((name, n) => ({ name, colour: COLOURS[n], x: turn, y: part(n) }));
     along.push({ name: "size", colour: "#1f2933", x: turn, y: size });
     this.plots.replaceChildren(
       lines("chip thickness [\u00b5m]", "angle of the tooth [\u00b0], 90: along the feed", profiles, [0, 360],
-        "chip_max_mm" in bounds ? [[1000 * bounds.chip_max_mm, `limit ${number(1000 * bounds.chip_max_mm)} \u00b5m`]] : []),
+        "chip_max_mm" in bounds ? [[1000 * bounds.chip_max_mm, `limit ${number(1000 * bounds.chip_max_mm, 6)} \u00b5m`]] : []),
       polar("force over a revolution, X and Y [N]", part(0), part(1), bounds.force_xy_n ?? bounds.force_n ?? null),
       lines("force on the cutter [N]", over, along, [0, 360], limit("force_n", "N")),
       lines("torque [N m]", over, [{ name: "torque", colour: COLOURS[2], x: turn, y: part(3) }], [0, 360], limit("torque_nm", "N m")),

@@ -32,12 +32,12 @@ export class Measure {
     ball.renderOrder = 9;
     this.group.add(ball);
     if (this.picks.length < 2) {
-      return `${on}: X ${number(place.x)}  Y ${number(place.y)}  Z ${number(place.z)}   click the second place`;
+      return `${on}: X ${number(place.x, 5)}  Y ${number(place.y, 5)}  Z ${number(place.z, 5)}   click the second place`;
     }
     const [a, b] = this.picks.map((pick) => pick.place), d = b.clone().sub(a);
     const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints([a, b]), new THREE.LineBasicMaterial({ color: BLUE, depthTest: false }));
     line.renderOrder = 9;
     this.group.add(line);
-    return `${number(d.length())} mm   dX ${number(d.x)}  dY ${number(d.y)}  dZ ${number(d.z)}   ${this.picks[0].on} to ${on}`;
+    return `${number(d.length(), 5)} mm   dX ${number(d.x, 5)}  dY ${number(d.y, 5)}  dZ ${number(d.z, 5)}   ${this.picks[0].on} to ${on}`;
   }
 }

@@ -45,8 +45,9 @@ const STYLE = `
 @media (max-width: 600px) { .cv-scale { display: none; } .cv-note { max-width: calc(100% - 110px); } }
 `;
 
-export function number(x: number): string {
-  return Number.isFinite(x) ? String(Number(x.toPrecision(4))) : "not known";
+export function number(x: number, digits = 3): string {
+  if (!Number.isFinite(x)) return "not known";
+  return String(Number(Math.abs(x) >= 10 ** digits ? x.toFixed(0) : x.toPrecision(digits)));
 }
 
 /** Legends that mean the same as one, with the words of all of them. */
@@ -149,7 +150,7 @@ export class Overlay {
       ramp.append(mark);
     }
     const worse = c.least ? c.low < c.limit : c.high > c.limit;
-    const text = worse ? `red and thick: ${c.least ? "below" : "above"} ${number(c.limit)}` : `limit ${number(c.limit)}`;
+    const text = worse ? `red and thick: ${c.least ? "below" : "above"} ${number(c.limit, 6)}` : `limit ${number(c.limit, 6)}`;
     this.add(worse ? "cv-red" : "", text, head);
   }
 

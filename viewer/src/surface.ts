@@ -5,6 +5,7 @@ import { LineMaterial } from "three/examples/jsm/lines/LineMaterial.js";
 import { LineSegments2 } from "three/examples/jsm/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeometry.js";
 import { Document, Header, MapLegend, SurfaceMap } from "./document";
+import { number } from "./overlay";
 import { shade } from "./path";
 
 /** the greatest displacement is drawn as at most this share of the size of the surface */
@@ -77,14 +78,14 @@ export class MapBody {
     // next to the greatest value it is nothing
     const low = Math.abs(this.map.low) < 1e-4 * Math.abs(high) ? 0 : this.map.low;
     const stops = Array.from({ length: STOPS }, (_, k) => low + (high - low) * k / (STOPS - 1)).map((v) => [v, hex(v)] as [number, string]);
-    const [least, most] = this.map.tolerance ?? [null, null], text = (v: number) => String(Number(v.toPrecision(4)));
+    const [least, most] = this.map.tolerance ?? [null, null], text = (v: number) => number(v, 6);
     if (this.banded) {
       const names = [least === null ? "" : `below ${text(least)}`, "within the tolerance", most === null ? "" : `above ${text(most)}`];
       const colours = BANDS.map((c) => "#" + c.map((x) => x.toString(16).padStart(2, "0")).join(""));
       const bands = names.map((name, k) => [name, colours[k]] as [string, string]).filter(([name]) => name);
       return { title: unit ? `${label} [${unit}]` : label, stops: [], words: bands };
     }
-    const words: [string, string][] = limit !== null && this.map.lines.n ? [[`limit ${Number(limit.toPrecision(4))}`, "#d01414"]] : [];
+    const words: [string, string][] = limit !== null && this.map.lines.n ? [[`limit ${number(limit, 6)}`, "#d01414"]] : [];
     return { title: unit ? `${label} [${unit}]` : label, stops, words };
   }
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from chipload.checking import part_numbers
 from chipload.lazy import trimesh
-from chipload.number_text import number_text
+from chipload.number_text import number_text, place_text
 from chipload.report.scene import legend
 from chipload.report.sheet import table
 from chipload.simulation.surface import Collision, Difference
@@ -70,7 +70,7 @@ def section(
         what = part_numbers.numbers(left, columns)
         gouge, excess, span = what["gouge_mm"], what["excess_mm"], span_of(left, columns)
         rows = [
-            [name, f"{v['max']:.4g}", str(v["line"] or ""), ", ".join(f"{x:.4g}" for x in v["place"] or [])]
+            [name, f"{v['max']:.4g}", str(v["line"] or ""), place_text(v["place"] or [])]
             for name, v in (("deepest gouge [mm]", gouge), ("highest excess [mm]", excess))
         ]
         body += [
@@ -94,7 +94,7 @@ def section(
         rows = [
             [
                 str(c.line), c.what, c.into, f"{c.depth_mm:.3g}", f"{float(t[c.step]):.4g}",
-                ", ".join(f"{x:.4g}" for x in c.at),
+                place_text(c.at),
             ]
             for c in collisions[:LISTED]
         ]  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from chipload.number_text import number_text
+from chipload.number_text import number_text, worst_text
 from chipload.progress import Progress
 from chipload.result.columns import COLUMNS
 from chipload.simulation.removal import Columns
@@ -54,7 +54,7 @@ class PartialLimits:
             beyond = ", beyond the limit" if value > limit else ""
             where = f" in line {line}" if line else ""
             unit = f" {column.unit}" if column.unit else ""
-            texts.append(f"{column.label} {number_text(value)} of {number_text(limit, 6)}{unit}{where}{beyond}")
+            texts.append(f"{column.label} {worst_text(value, limit)} of {number_text(limit, 6)}{unit}{where}{beyond}")
         return f"so far {', '.join(texts)}" if texts else ""
 
     def with_text(self, progress: Progress) -> Progress:

@@ -91,7 +91,7 @@ def show_time(result: Result) -> None:
     from chipload.result.times import JERK_NOTE, time_text
 
     tracks = [t for t in result.in_use if t.time_high_s is not None]
-    texts = [f"{f'{t.name} ' if len(tracks) > 1 else ''}{time_text(t.time_s, t.time_high_s, '.4g')} s" for t in tracks]
+    texts = [f"{f'{t.name} ' if len(tracks) > 1 else ''}{time_text(t.time_s, t.time_high_s)} s" for t in tracks]
     if any(" to " in text for text in texts):
         show(f"time: {', '.join(texts)}. {JERK_NOTE}")
 
@@ -102,8 +102,7 @@ def show_limits(result: Result) -> None:
 
     known = [c for c in result.limits if c.worst is not None]
     worst = ", ".join(
-        f"{c.column.label} {number_text(c.worst or 0.0)} of {number_text(c.limit, 6)} {c.column.unit}".strip()
-        for c in known
+        f"{c.column.label} {c.worst_text} of {number_text(c.limit, 6)} {c.column.unit}".strip() for c in known
     )
     if worst:
         show(f"worst values: {worst}")

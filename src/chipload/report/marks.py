@@ -37,8 +37,8 @@ def marks_of(
     for c in sorted(worst, key=lambda c: -_share(c)):
         k = row(c)
         if k is not None:
-            value, limit = number_text(c.worst or 0.0), number_text(c.limit, 6)
-            text = f"{c.column.label} {value} {c.column.unit}, limit {limit}"
+            limit = number_text(c.limit, 6)
+            text = f"{c.column.label} {c.worst_text} {c.column.unit}, limit {limit}"
             out.append(ViewMark(k, _place_of(place[k]), text, "limit"))
     touched = []
     for f in track.findings:

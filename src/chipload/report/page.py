@@ -133,11 +133,11 @@ def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:
         f'<span class="name">{escape(check.column.title)}</span>',
         state_cell(check.state),
         number_text(check.limit, 6),
-        "not known" if check.worst is None else number_text(check.worst),
+        check.worst_text,
         percent_text(check.error) if check.error else "",
         "" if check.value_at_confidence is None else number_text(check.value_at_confidence, 3),
         str(check.line or ""),
-        "" if check.t_s is None else f"{check.t_s:.4g}",
+        "" if check.t_s is None else number_text(check.t_s),
         place_cell(check),
     ]
 

@@ -114,8 +114,7 @@ def _limit(track: Track, check: LimitCheck, named: bool) -> tuple[str, ...]:
     """The row of a limit."""
     name = f"{track.name}: {check.column.title}" if named else check.column.title
     name += "" if check.coverage.whole else f", {check.coverage.name}"
-    worst = "not known" if check.worst is None else number_text(check.worst)
-    return (name, check.state.value, number_text(check.limit, 6), worst, str(check.line or ""), check.reason)
+    return (name, check.state.value, number_text(check.limit, 6), check.worst_text, str(check.line or ""), check.reason)
 
 
 def _tracks(result: Result) -> list[Track]:

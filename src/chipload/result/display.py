@@ -40,7 +40,7 @@ def result_html(result: Result) -> str:
     limits = table_html(
         ("limit", "worst", "allowed", "unit", "state", "track", "where"),
         (
-            (check.column.label, _number(check.worst), number_text(check.limit, 6), check.column.unit,
+            (check.column.label, check.worst_text, number_text(check.limit, 6), check.column.unit,
              check.state.value, track.name, check.where)
             for track in result.in_use
             for check in track.limits
@@ -52,7 +52,7 @@ def result_html(result: Result) -> str:
             (
                 track.name,
                 "yes" if track.in_use else "no",
-                time_text(track.time_s, track.time_high_s, ".4g"),
+                time_text(track.time_s, track.time_high_s),
                 track.verdict.value,
             )
             for track in result.tracks
@@ -68,10 +68,6 @@ def _findings(found: Sequence[Finding]) -> str:
     if len(texts) > FINDINGS:
         items.append(f"<li>and {len(texts) - FINDINGS} more</li>")
     return f"<ul>{''.join(items)}</ul>" if items else ""
-
-
-def _number(value: float | None) -> str:
-    return "not known" if value is None else number_text(value)
 
 
 def _side(cell: str) -> str:

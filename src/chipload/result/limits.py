@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.number_text import number_text, percent_text
+from chipload.number_text import number_text, percent_text, place_text, worst_text
 from chipload.result.budget import ErrorBudget, level_text
 from chipload.result.columns import Column, column_of, error_of
 from chipload.result.coverage import FAR_BEYOND, WHOLE, Coverage, CoveredRows, coverage_of
@@ -168,12 +168,21 @@ class LimitCheck:
 
     @property
     def place_text(self) -> str:
-        """The place in mm, to 0.1 um; empty if it is not known.
+        """The place in mm, to 0.01 mm; empty if it is not known.
 
         >>> LimitCheck("force_n", 500.0, 812.0, Verdict.EXCEEDS, place=(5.7e-17, 2.25, -33.33333)).place_text
         '0, 2.25, -33.33'
         """
-        return ", ".join(f"{round(x, 4) + 0.0:.4g}" for x in self.place or ())
+        return place_text(self.place or ())
+
+    @property
+    def worst_text(self) -> str:
+        """The worst value, with as many digits as show on which side of the limit it lies.
+
+        >>> [LimitCheck("force_n", 500.0, f, Verdict.EXCEEDS).worst_text for f in (812.34, 500.04)]
+        ['812', '500.04']
+        """
+        return "not known" if self.worst is None else worst_text(self.worst, self.limit)
 
     @property
     def where(self) -> str:
@@ -205,8 +214,8 @@ class LimitCheck:
             return f"{self.column.label} of {bound} {number_text(self.limit, 6)}{self._unit} is unknown: {self.reason}"
         if self.state is Verdict.EXCEEDS and not self._counts_none:
             beyond = "is below" if self.column.least else "exceeds"
-            worst, limit = number_text(self.worst), number_text(self.limit, 6)
-            return f"{self.column.label} {worst}{self._unit} {beyond} {limit}{self._unit} {self.where}".rstrip()
+            limit, unit = number_text(self.limit, 6), self._unit
+            return f"{self.column.label} {self.worst_text}{unit} {beyond} {limit}{unit} {self.where}".rstrip()
         if self.state is Verdict.UNPROVEN:
             return f"{self.value_text} {self.where}".rstrip() + f", unproven: {self.reason}"
         return self.value_text
@@ -222,7 +231,7 @@ class LimitCheck:
         label, limit = self.column.label, f"{number_text(self.limit, 6)}{self._unit}"
         if self.worst is None:
             return f"{label} of {limit}"
-        worst = number_text(self.worst)
+        worst = self.worst_text
         if self.by_confidence and self.budget is not None:
             more = self.budget.value(abs(self.worst), least=self.column.least) - abs(self.worst)
             worst += f" {'-' if more < 0.0 else '+'} {number_text(abs(more), 2)}"
@@ -230,7 +239,7 @@ class LimitCheck:
         if self.worst == self.limit == 0.0:
             text = self.column.none or f"no {label}"
         elif self._counts_none:
-            text = f"{number_text(self.worst)} {label}"
+            text = f"{self.worst_text} {label}"
         elif self.state is Verdict.UNPROVEN and self.margin is not None and self.margin < -FAR_BEYOND:
             text = f"{label} far beyond {limit}"
         return text if self.coverage.whole or self.state is not Verdict.HOLDS else f"{text} in the {self.coverage.name}"

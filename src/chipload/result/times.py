@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chipload.number_text import number_text
 from chipload.result.coverage import CUTTING, Columns, durations
 
 #: why the time of a program is an interval
@@ -38,15 +39,17 @@ class Times:
         return self.cut + self.air + self.rapid + self.dwell + self.other
 
 
-def time_text(low: float | None, high: float | None, form: str = ".5g", unit: float = 1.0) -> str:
+def time_text(low: float | None, high: float | None, form: str = "", unit: float = 1.0) -> str:
     """A time of a program in units of ``unit`` [s], as an interval where it is one; empty: it was not run.
+
+    ``form``: of its digits; empty: as :func:`number_text`.
 
     >>> time_text(90.0, None), time_text(90.0, 99.0, ".2f", 60.0), time_text(90.0, 90.0001), time_text(None, None)
     ('90', '1.50 to 1.65', '90', '')
     """
     if low is None:
         return ""
-    ends = [format(t / unit, form) for t in (low, low if high is None else high)]
+    ends = [format(t / unit, form) if form else number_text(t / unit) for t in (low, low if high is None else high)]
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.number_text import number_text
 from chipload.result.style import FONT, GRID, INK, LIMIT
 from chipload.result.thinning import thin_rows
 from chipload.web.checks import Bound, bound_of, label_and_unit
@@ -209,7 +210,7 @@ def _value(result: PageResult, track: PageTrack, column: str, row: int) -> str:
         return "-"
     values = result.column(track, column)
     if not isinstance(values, TextColumn):
-        return f"{values[row]:.5g}"
+        return number_text(float(values[row]))
     return values.words[int(values.codes[row])] if values.codes[row] >= 0 else ""
 
 

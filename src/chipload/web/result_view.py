@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from chipload.number_text import number_text
 from chipload.report.answer import answer_html
 from chipload.result import Verdict
 from chipload.result.changes import Change, ChangeKind
@@ -382,7 +381,7 @@ class ResultView:
         if self.table.value == "tools":
             self.tools.at(k)
         x, y, z = track.place[k].tolist()
-        clock = f"{track.t[k]:.3f} of {number_text(track.t[-1], 5)} s \u00b7 "
+        clock = f"{track.t[k]:.2f} of {track.t[-1]:.2f} s \u00b7 "
         line = f" \u00b7 line {int(self.source.text.of_row[k])}" if self.source.text is not None else ""
         self.where.set_text(f"{clock}step {k + 1} of {len(track)}{line} \u00b7 X {x:.3f} Y {y:.3f} Z {z:.3f}")
 

@@ -130,7 +130,7 @@ def stated_profile(stress: ResidualStressTable, folder: Path, thickness: float) 
     if abs(profile.thickness - thickness) > NEAR * thickness:
         raise InputError(
             f"residual_stress: its points end at a height of {profile.thickness:g} mm: must be at the upper side of "
-            f"the plate, {number_text(thickness)} mm above its underside, as [stock] states it"
+            f"the plate, {number_text(thickness, 6)} mm above its underside, as [stock] states it"
         )
     return profile
 

@@ -185,7 +185,7 @@ def limit_text(planned: CutSteps, limit: PathLimit, where: str) -> str:
     return (
         f"a coarse simulation gives a torque limit of about {number_text(1e-3 * limit.torque, 2)} N m, "
         f"{where}; the feed there "
-        f"must be at most {number_text(feed)} mm/min, {own}"
+        f"must be at most {number_text(feed, 4)} mm/min, {own}"
         if feed < programmed * (1.0 - 1e-3)
         else f"a coarse simulation gives a torque limit of about {number_text(1e-3 * limit.torque, 2)} N m, {where}; "
         f"{own} there, which is within it"

@@ -17,6 +17,8 @@ from chipload.web.result import PageResult, PageTrack
 
 #: how a state is written
 CLASSES = {Verdict.HOLDS: "ok", Verdict.EXCEEDS: "no", Verdict.UNPROVEN: "may"}
+#: classes of a finding
+KINDS = {Severity.NOTE: "cl-note", Severity.UNPROVEN: "cl-grave cl-may", Severity.EXCEEDS: "cl-grave cl-no"}
 #: a click on a row of the table gives its row of the history
 CLICK = "(e) => { const r = e.target.closest('[data-row]'); if (r) emit(Number(r.getAttribute('data-row'))) }"
 
@@ -54,7 +56,6 @@ def limit_table(track: PageTrack) -> str:
     for c in rows:
         row, unit = row_of(track, c), escape(c.column.unit)
         go = f' data-row="{row}" class="cl-go" title="go there"' if row is not None else ""
-        worst = "not known" if c.worst is None else number_text(c.worst)
         covers = "" if c.coverage.whole else f"<small>, {escape(c.coverage.name)}</small>"
         name = escape(c.column.label) + covers
         share = min(100.0 * c.worst / c.limit, 100.0) if c.worst is not None and c.limit > 0.0 else 0.0
@@ -64,7 +65,7 @@ def limit_table(track: PageTrack) -> str:
         where, state = escape(c.reason or c.where), CLASSES[c.state]
         bar = f'<div class="cl-share"><div class="cl-{state}-bar" style="width:{share:.0f}%"></div></div>'
         out.append(
-            f"<tr{go}><td>{name}</td><td class=n>{worst}</td>"
+            f"<tr{go}><td>{name}</td><td class=n>{c.worst_text}</td>"
             f"<td class=n>{least}{number_text(c.limit, 6)} {unit}</td>"
             f"<td>{bar}</td><td class=cl-{state}>{c.state.value}</td>"
             f'<td class=w title="{where}"><div>{where}</div></td></tr>'
@@ -94,6 +95,6 @@ def finding_list(rows: list[PageFinding]) -> str:
     items = []
     for f in rows:
         go = f' data-row="{f.row}"' if f.row is not None else ""
-        kind = ("cl-grave" if f.severity is not Severity.NOTE else "cl-note") + (" cl-go" if f.row is not None else "")
+        kind = KINDS[f.severity] + (" cl-go" if f.row is not None else "")
         items.append(f'<div class="{kind}"{go}>{escape(f.text)}</div>')
     return f'<div class="cl-found">{"".join(items)}</div>' if items else ""

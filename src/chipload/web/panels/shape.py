@@ -18,11 +18,10 @@ def variant_table(result: Result) -> str:
     rows = []
     for track in sorted(result.tracks, key=lambda one: not one.in_use):
         for check in track.limits:
-            worst = "not known" if check.worst is None else number_text(check.worst)
             name = escape(track.name) + (" <b>in use</b>" if track.in_use else "")
             state = VERDICTS[check.state]
             rows.append(
-                f"<tr><td>{name}</td><td>{escape(check.column.label)}</td><td class=n>{worst}</td>"
+                f"<tr><td>{name}</td><td>{escape(check.column.label)}</td><td class=n>{check.worst_text}</td>"
                 f"<td class=n>{number_text(check.limit, 6)} {escape(check.column.unit)}</td><td>{bar_html(check)}</td>"
                 f'<td class="cl-{state}">{check.state.value}</td><td class="cl-reason">{escape(check.reason)}</td></tr>'
             )
@@ -56,7 +55,7 @@ class ShapePanel:
                     ui.html(critical_html(result), sanitize=True).mark("answer")
                 ui.label(result.first_lines[0]).classes("cl-message").props("role=status")
                 for line in result.first_lines[1:]:
-                    ui.label(line)
+                    ui.label(line).classes("cl-lines")
             for change in result.changes:
                 ui.label(f"change: {change.line_text}")
             ui.html(variant_table(result), sanitize=True).classes("cl-scroll").props("tabindex=0").mark("variants")
