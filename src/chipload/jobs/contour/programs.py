@@ -1,4 +1,6 @@
-"""The programs of a result in RS-274 and as APT CL data; the first line states the verdict of the job."""
+"""The programs of a result in RS-274 and as APT CL data, and the stock that remains; the first line of a program states
+the verdict of the job.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from chipload.result import Result, release_of
 
 
 def program_files(outcome: ContourResult, result: Result) -> dict[str, bytes]:
-    """All programs by file name: each strategy of each operation for the controller and as CL data."""
+    """All programs by file name: each strategy of each operation for the controller and as CL data; and the stock that
+    a contour of one operation leaves.
+    """
     out: dict[str, bytes] = {}
     ending = ENDINGS[outcome.machine.dialect]
     for k, op in enumerate(outcome.operations):
@@ -29,6 +33,11 @@ def program_files(outcome: ContourResult, result: Result) -> dict[str, bytes]:
         name, text = op.inserted
         if text:
             out[inserted_name(k, name)] = text.encode("utf-8")
+    if len(outcome.operations) == 1 and outcome.operations[0].result.kind != "pocket":
+        (op,) = outcome.operations
+        used = op.simulations.get(op.result.use)
+        if used is not None and used.stock is not None:
+            out["stock.npz"] = used.stock.to_bytes()
     return out
 
 

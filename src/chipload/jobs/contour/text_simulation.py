@@ -98,6 +98,7 @@ class SimulatedText:
     resolution_error : relative error of columns
     samples : tooth engagement of some steps; None: nothing is cut
     load_parts : other parts of the error of the worst loads, by tool and load
+    stock : that remains; None: the stock of the operation is not stated
     """
 
     program: Program
@@ -106,6 +107,7 @@ class SimulatedText:
     resolution_error: Mapping[str, float]
     samples: EngagementSamples | None
     load_parts: Mapping[tuple[int, str], LoadParts] = field(default_factory=dict)
+    stock: LayeredStock | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +282,8 @@ def simulate_text(
         *reversed_cuts(steps, removal.columns, cutters),
         *program_findings(program, steps, removal.columns, cutters, around),
     )
-    return SimulatedText(program, found, findings, errors, recorder.samples(), removal.load_parts)
+    left = None if stock.region is None else body
+    return SimulatedText(program, found, findings, errors, recorder.samples(), removal.load_parts, left)
 
 
 def _findings(reading: ProgramReading) -> tuple[Finding, ...]:
