@@ -304,6 +304,13 @@ def test_a_side_is_milled_by_points_with_a_moving_axis(more):
     assert not track["in_use"]
     limits = {x["name"]: x["state"] for x in track["limits"]}
     assert {"gouge_mm", "scallop_mm", "axial_overrun_mm", "deflection_cutter_um"} <= set(limits)
+    # in the line of the greatest scallop the cutter passes its place at the height of the scallop
+    (scallop,) = (x for x in track["limits"] if x["name"] == "scallop_mm")
+    lines, tip, axis = poses_of(out, points)
+    there, place = lines == scallop["line"], np.array([scallop["place"]])
+    assert there.any()
+    assert away_from(points, tip[there], axis[there], place) == pytest.approx(scallop["worst"], abs=0.01)
+    assert away_from(points, tip, axis, place) == pytest.approx(scallop["worst"], abs=0.01)
     assert limits.pop("deflection_workpiece_um") in ("holds", "unproven")
     assert set(limits.values()) == {"holds"}
     own, away, taken = by_the_text(out, points)
@@ -324,16 +331,33 @@ def test_a_side_is_milled_by_points_with_a_moving_axis(more):
 def by_the_text(out, program):
     """Distances of points of the side, and the least of the channel's walls, from the cutter along a text of axes; the
     volume of the stock that the cutter sweeps [mm^3], by points drawn in it.
+    """
+    _, tip, axis = poses_of(out, program)
+    impeller = impeller_of(ImpellerShape())
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.30, 0.45, 41), np.linspace(0.50, 0.70, 21), indexing="ij"))
+    own = away_from(program, tip, axis, impeller.blade.plus.at(u, v))
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.01, 0.99, 61), np.linspace(0.0, 0.99, 25), indexing="ij"))
+    walls = (impeller.blade.plus, impeller.blade.minus, impeller.body(1).minus)
+    low, high = (np.array(tomllib.loads(STOCK)["stock"][key]) for key in ("low_mm", "high_mm"))
+    drawn = np.random.default_rng(1).uniform(low, high, (4000, 3))
+    share = np.concatenate([away_from(program, tip, axis, some) < 0.0 for some in np.split(drawn, 40)]).mean()
+    least = min(away_from(program, tip, axis, wall.at(u, v)).min() for wall in walls)
+    return own, least, share * np.prod(high - low)
+
+
+def poses_of(out, program):
+    """Line, tip and axis of the poses along a text of axes, eight in each motion.
 
     The text is read by a few regular expressions and brought back to tips and axes by the machine's chain.
     """
     machine = machine_named("cradle-ac")
-    position, rows = {"X": 0.0, "Y": 0.0, "Z": 0.0, "A": 0.0, "C": 0.0}, []
-    for line in (out / f"{program['program']}.ngc").read_text().splitlines():
+    position, rows, lines = {"X": 0.0, "Y": 0.0, "Z": 0.0, "A": 0.0, "C": 0.0}, [], []
+    for number, line in enumerate((out / f"{program['program']}.ngc").read_text().splitlines(), 1):
         if line.startswith(("(", "M", "T", "G43")) or not re.search(r"[XYZAC]-?\d", line):
             continue
         position |= {letter: float(x) for letter, x in re.findall(r"([XYZAC])(-?[\d.]+)", line)}
         rows.append(list(position.values()))
+        lines.append(number)
     q = np.zeros((len(rows), 9))
     # the text counts from the work offset, 77.5 mm above the origin of the axes
     q[:, [0, 1, 2]] = np.array(rows)[:, :3] + machine.chain.work_zero
@@ -343,25 +367,17 @@ def by_the_text(out, program):
     share = np.linspace(0.0, 1.0, 9)[:-1, None, None]
     tip, axis = (((1.0 - share) * x[:-1] + share * x[1:]).reshape(-1, 3) for x in (tip, axis))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
-    impeller = impeller_of(ImpellerShape())
+    return np.tile(lines[2:], 8), tip, axis
+
+
+def away_from(program, tip, axis, points):
+    """Distance of each point from the cutter in all these poses, its corner as that of a ball at its rim."""
     R, r = 0.5 * program["diameter_mm"], program["corner_radius_mm"]
-
-    def away(points):
-        """Distance of each point from the cutter in all its poses, its corner as that of a ball at its rim."""
-        h = points @ axis.T - (tip * axis).sum(axis=1)
-        square = (points * points).sum(axis=1)[:, None] - 2.0 * points @ tip.T + (tip * tip).sum(axis=1)
-        d = np.sqrt(np.maximum(square - h * h, 0.0))
-        low = np.where(d > R - r, np.hypot(d - R + r, h - r), r - h) - r
-        return np.where(h >= r, d - R, low).min(axis=1)
-
-    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.30, 0.45, 41), np.linspace(0.50, 0.70, 21), indexing="ij"))
-    own = away(impeller.blade.plus.at(u, v))
-    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.01, 0.99, 61), np.linspace(0.0, 0.99, 25), indexing="ij"))
-    walls = (impeller.blade.plus, impeller.blade.minus, impeller.body(1).minus)
-    low, high = (np.array(tomllib.loads(STOCK)["stock"][key]) for key in ("low_mm", "high_mm"))
-    drawn = np.random.default_rng(1).uniform(low, high, (4000, 3))
-    share = np.concatenate([away(some) < 0.0 for some in np.split(drawn, 40)]).mean()
-    return own, min(away(wall.at(u, v)).min() for wall in walls), share * np.prod(high - low)
+    h = points @ axis.T - (tip * axis).sum(axis=1)
+    square = (points * points).sum(axis=1)[:, None] - 2.0 * points @ tip.T + (tip * tip).sum(axis=1)
+    d = np.sqrt(np.maximum(square - h * h, 0.0))
+    low = np.where(d > R - r, np.hypot(d - R + r, h - r), r - h) - r
+    return np.where(h >= r, d - R, low).min(axis=1)
 
 
 def test_a_thin_blade_bends_and_its_program_is_not_released(more):

@@ -37,6 +37,10 @@ def test_scallop_of_a_ball_between_parallel_passes():
     off = np.abs(y - w * np.round(y / w))
     assert np.abs(got.rest - (4.0 - np.sqrt(16.0 - off**2))).max() < 1e-6
     assert got.deepest[0] < 1e-9
+    # a pass is four rows after the first rapid, its second one cuts: the nearest pass leaves what is left
+    nearest = np.abs(y[:, None] - ys).argmin(axis=1)
+    one = np.abs(off - 0.5 * w) > 1e-6
+    assert (got.rest_row == 2 + 4 * nearest)[one].all()
     numbers = scallop_numbers(crests, 0.15)
     assert numbers["mean_share"] == pytest.approx(h / 0.15, rel=1e-6)
 

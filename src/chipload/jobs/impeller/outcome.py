@@ -140,8 +140,15 @@ class Limiting:
 
 @dataclass(frozen=True)
 class Scallop:
-    """Scallops that the check measures on a patch: ``limit``, greatest excess between two passes, mean height of the
-    scallops [mm], their number, and the share of the patch with no more excess than the limit.
+    """Scallops that the check measures on a patch.
+
+    Parameters
+    ----------
+    limit, greatest, mean : allowed, greatest excess between two passes, mean height of the scallops [mm]
+    count : of the scallops
+    covered : share of the patch with no more excess than the limit
+    place : (x, y, z) [mm] of the greatest; None: no passes lie on both sides
+    row : of the program that passes lowest there; -1: none does
     """
 
     limit: float
@@ -149,6 +156,8 @@ class Scallop:
     mean: float
     count: int
     covered: float
+    place: tuple[float, float, float] | None
+    row: int
 
     @property
     def holds(self) -> bool:

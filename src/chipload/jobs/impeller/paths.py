@@ -104,11 +104,12 @@ def checked_programs(
     found = [left_by(job, walls, program, cutter, depth, keep) for program, cutter in both]
     # what is left is what no program takes
     rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
-    others = iter(rest)
+    own = [k for k, setting in enumerate(settings) for _ in setting.millings]
+    others = ((left, found[k][i].rest_row) for i, (k, left) in enumerate(zip(own, rest, strict=False)))
     out = []
     for setting, read in zip(settings, reads, strict=True):
         program = setting.program
-        scallops = tuple(_scallop(m, next(others), scallop) for m in setting.millings)
+        scallops = tuple(_scallop(m, *next(others), scallop) for m in setting.millings)
         _, findings = to_axes(program, machine)
         on_machine = axes_check(*findings, *too_fast(program, machine))
         gouge = gouge_by(job, coarse, read.program, setting.cutter, depth, paths.gouge_mm, keep)
@@ -133,14 +134,11 @@ def left_by(
 ) -> tuple[Remainder, ...]:  # fmt: skip
     """Excess that a program leaves on each wall."""
     got = _left_task(walls, program, cutter, depth).of(job, keep)
-    return tuple(
-        Remainder(w, rest, gouge, row, part, _HEIGHT, depth)
-        for w, (rest, gouge, row, part) in zip(walls, got, strict=True)
-    )
+    return tuple(Remainder(w, *columns, _HEIGHT, depth) for w, columns in zip(walls, got, strict=True))
 
 
 def _left_task(walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float) -> PlanTask:
-    key = ("left", *_moves_key(program, cutter), [w.points for w in walls])
+    key = ("left with rows", *_moves_key(program, cutter), [w.points for w in walls])
     return PlanTask(key, _left_columns, (walls, program, cutter, depth))
 
 
@@ -148,7 +146,7 @@ def _left_columns(
     job: FinishSettings, walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float
 ) -> list[list[NDArray[Any]]]:
     found = left_on(walls, program, cutter, _HEIGHT, depth, workers=job.workers)
-    return [[x.rest, x.gouge, x.row, x.part] for x in found]
+    return [[x.rest, x.rest_row, x.gouge, x.row, x.part] for x in found]
 
 
 def gouge_by(
@@ -188,13 +186,16 @@ def _whole(job: FinishSettings, body: int, side: str, millings: Sequence[Milling
     return wall(f"{BODIES[body]} {side}", surface, grid[0], grid[1])
 
 
-def _scallop(milling: Milling, left: Remainder, limit: float) -> Scallop:
-    """The scallop of a patch where passes lie on both sides."""
+def _scallop(milling: Milling, left: Remainder, own_row: NDArray[np.int64], limit: float) -> Scallop:
+    """The scallop of a patch where passes lie on both sides; ``own_row`` (n,) of its program that passes lowest."""
     within = between_lines(milling.tracks.tracks, milling.along, np.column_stack([left.wall.u, left.wall.v]))
     numbers = scallop_numbers(left.scallops("v" if milling.along == "u" else "u", within), limit)
-    most = float(left.rest[within].max()) if within.any() else 0.0
+    k = int(np.where(within, left.rest, -1.0).argmax())
+    most = float(left.rest[k]) if within.any() else 0.0
     covered = float(left.wall.area[left.rest <= limit].sum() / left.wall.area.sum())
-    return Scallop(limit, most, numbers["mean_mm"], int(numbers["count"]), covered)
+    x, y, z = left.wall.points[k].tolist()
+    place = (x, y, z) if within.any() else None
+    return Scallop(limit, most, numbers["mean_mm"], int(numbers["count"]), covered, place, int(own_row[k]))
 
 
 def _dense(impeller: Impeller, milling: Milling, ahead: float) -> SurfacePoints:

@@ -156,8 +156,7 @@ def _five_axis(milled: ImpellerResult) -> list[Track]:
     out = []
     named: list[tuple[str, CheckedFlank | CheckedPoints]] = [*flank_names(milled), *points_names(milled)]
     for name, p in named:
-        state = state_of(p.excess, p.most, 0.0)[0]
-        limits = (_gouge(name, p), LimitCheck(p.limit, p.most, p.excess, state, name, resolution_error=0.0))
+        limits = (_gouge(name, p), _excess(name, p))
         findings = p.machine_check.findings
         ending = ENDINGS[p.machine.dialect]
         every = () if isinstance(p.every, str) else (f"{name}{ALL}.{ending}",)
@@ -254,7 +253,19 @@ def _scallops(track: str, p: Checked) -> tuple[LimitCheck, ...]:
     k = int(np.argmax([s.greatest / s.limit for s in p.scallops]))
     s = p.scallops[k]
     state = state_of(s.greatest, s.limit, 0.0)[0]
-    return (LimitCheck("scallop_mm", s.limit, s.greatest, state, track, resolution_error=0.0),)
+    row = s.row if s.place is not None and s.row >= 0 else None
+    return (LimitCheck("scallop_mm", s.limit, s.greatest, state, track, row=row, place=s.place, resolution_error=0.0),)
+
+
+def _excess(track: str, p: FiveAxisProgram) -> LimitCheck:
+    """The point of a surface on which most is left."""
+    k = int(p.left.rest.argmax())
+    x, y, z = p.left.wall.points[k].tolist()
+    row = int(p.left.rest_row[k])
+    state = state_of(p.excess, p.most, 0.0)[0]
+    return LimitCheck(
+        p.limit, p.most, p.excess, state, track, row if row >= 0 else None, 0, (x, y, z), resolution_error=0.0
+    )
 
 
 def _loads(track: str, p: Checked) -> tuple[LimitCheck, ...]:

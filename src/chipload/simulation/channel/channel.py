@@ -94,6 +94,7 @@ class Remainder:
     ----------
     wall : the points
     rest : (n,) [mm] remaining material along the normal; ``height``: this or more
+    rest_row : (n,) row of the program that leaves it; -1: none passes below ``height``
     gouge : (n,) [mm] greatest depth below the surface, at most ``depth``
     row, part : (n,) row of the program and part (:data:`PARTS`) of the gouge; -1: there is none
     height, depth : ends of the rays above and below the surface [mm]
@@ -101,6 +102,7 @@ class Remainder:
 
     wall: SurfacePoints
     rest: Floats
+    rest_row: Ints
     gouge: Floats
     row: Ints
     part: Ints
@@ -227,8 +229,9 @@ def left_on(
             for k, _ in enumerate(pool.map(block, range(0, n, _BLOCK)), 1):
                 progress((done + min(k * _BLOCK, n)) / total, w.name)
         done += n
-        row = np.where(row >= 0, of[np.maximum(row, 0)], -1)
-        out.append(Remainder(w, rest, gouge, row, np.where(part >= 0, kinds[np.maximum(part, 0)], -1), height, depth))
+        row, rest_row = (np.where(k >= 0, of[np.maximum(k, 0)], -1) for k in (row, rest_row))
+        found_part = np.where(part >= 0, kinds[np.maximum(part, 0)], -1)
+        out.append(Remainder(w, rest, rest_row, gouge, row, found_part, height, depth))
     return tuple(out)
 
 
