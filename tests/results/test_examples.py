@@ -9,6 +9,7 @@ from html import unescape
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import shapely
 from typer.testing import CliRunner
 
 from chipload.cli import app
@@ -19,6 +20,7 @@ from chipload.program.read import line_times, read_program, read_tools
 from chipload.report.page import HEADINGS, WHOLE
 from chipload.result import COLUMNS, Verdict
 from chipload.result.columns import unit_of
+from chipload.stock.layers import LayeredStock
 from chipload.web.result import open_result
 
 NAMES = (
@@ -309,3 +311,16 @@ def test_every_column_is_in_the_table_with_its_unit(example, name):
 @every
 def test_what_is_read_back_is_what_was_written(example, name):
     assert example(name).differences == ()
+
+
+def test_the_contour_leaves_its_wall_in_the_stock(example):
+    """stock.npz of the contour: metal just outside of the wall's lines and arc of 8 mm, none just inside of them."""
+    stock = LayeredStock.load(example("contour").folder / "stock.npz")
+    assert stock.bounds.tolist() == [-5.0, 0.0]
+    metal = shapely.union_all([stock.section(0)])
+    turn = np.radians(np.linspace(185.0, 265.0, 17))
+    arc = [[8.0 + r * np.cos(turn), 8.0 + r * np.sin(turn)] for r in (8.01, 7.99)]
+    along = np.linspace(9.0, 27.0, 10)
+    for (x, y), off, there in zip(arc, (-0.01, 0.01), (True, False), strict=True):
+        lines = np.concatenate([x, np.full(10, off), along]), np.concatenate([y, along, np.full(10, off)])
+        assert (shapely.contains_xy(metal, *lines) == there).all()
