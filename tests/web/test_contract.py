@@ -31,8 +31,8 @@ RUNS: dict[str, tuple[str, tuple[tuple[str, str], ...]]] = {
     "feeds": ("feeds", (("layer_mm = 1.0", "layer_mm = 2.0"),)),
     "trunnion": ("trunnion", ()),
 }
-#: run by processes of their own, for their exit codes; the others by this one, which loads compiled functions once
-PROCESSES = ("overloaded", "trunnion")
+#: run by a process of its own, for its exit code; the others by this one, which loads compiled functions once
+PROCESSES = ("trunnion",)
 #: a slot in two layers, in the place of the program of `feeds`
 SLOT = """%
 O1
