@@ -36,7 +36,7 @@ def test_key_numbers_and_their_differences(sides) -> None:
     assert numbers["time in cut"].values == pytest.approx((20.0, 40.0))
     assert KeyNumber("x", "", (None, 1.0)).difference(1) == (None, None)
     text = comparison_table(sides, "path")
-    assert "+450 (+100.0 %)" in text
+    assert "+450 (+100 %)" in text
     assert "holds" in text
     assert "exceeds" in text
 
@@ -131,7 +131,7 @@ def compared(browser, served, folder):
 def test_two_views_and_two_lines_stand_together(compared) -> None:
     page = compared
     cells = page.locator(".cl-compared tbody tr", has_text="greatest force").locator("td").all_inner_texts()
-    assert cells == ["greatest force [N]", "450", "900", "+450 (+100.0 %)"]
+    assert cells == ["greatest force [N]", "450", "900", "+450 (+100 %)"]
     lines = page.evaluate("document.querySelector('.cl-figure').data.map(d => [d.line.color, Math.max(...d.y)])")
     assert lines[:2] == [[COLOURS[0], 450.0], [COLOURS[1], 900.0]]
     page.evaluate(f"{VIEW}.go(99)")

@@ -47,7 +47,7 @@ def comparison_table(sides: Sequence[Side], against: str) -> str:
             if k:
                 more, percent = number.difference(k)
                 sign = "+" if more is not None and more > 0.0 else ""
-                share = "" if percent is None else f" ({percent:+.1f} %)"
+                share = "" if percent is None else f" ({'+' if percent > 0.0 else ''}{number_text(percent)} %)"
                 text = "" if more is None else f"{sign}{number_text(more, 3)}{share}"
                 cells.append(f"<td class=n>{text}</td>")
         unit = f" [{number.unit}]" if number.unit else ""
