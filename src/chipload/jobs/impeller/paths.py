@@ -134,7 +134,10 @@ def left_by(
 ) -> tuple[Remainder, ...]:  # fmt: skip
     """Excess that a program leaves on each wall."""
     got = _left_task(walls, program, cutter, depth).of(job, keep)
-    return tuple(Remainder(w, *columns, _HEIGHT, depth) for w, columns in zip(walls, got, strict=True))
+    return tuple(
+        Remainder(w, rest, rest_row, gouge, row, part, _HEIGHT, depth)
+        for w, (rest, rest_row, gouge, row, part) in zip(walls, got, strict=True)
+    )
 
 
 def _left_task(walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float) -> PlanTask:
