@@ -22,6 +22,7 @@ from chipload.errors import InputError
 from chipload.jobs.contour.outcome import PLANNED_ERRORS
 from chipload.jobs.contour.tables import OperationTable
 from chipload.machine.machine import Machine
+from chipload.number_text import number_text
 from chipload.planning.cost import CutConditions, cost
 from chipload.result import LimitCheck, Verdict
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
@@ -101,7 +102,7 @@ def greatest_engagement(
 
 def _limit_text(check: LimitCheck) -> str:
     """A limit that does not hold, with its value."""
-    value = "" if check.worst is None else f" {check.worst:.4g} of {check.limit:.4g}"
+    value = "" if check.worst is None else f" {check.worst_text} of {number_text(check.limit, 6)}"
     return f"{check.name}{value}{f', {check.reason}' if check.reason else ''}"
 
 
