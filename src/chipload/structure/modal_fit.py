@@ -139,7 +139,8 @@ def _check(frequency: Array, damping: Array, modal: Array, band: tuple[float, fl
             raise InputError(f"receptance: a mode at {f:.5g} Hz: must lie within {band[0]:g} to {band[1]:g} Hz")
         if f < LEAST_HZ:
             raise InputError(
-                f"receptance: the mode at {f:.3g} Hz: must be at least {LEAST_HZ:g} Hz: check the unit of the frequency"
+                f"receptance: the mode at {number_text(f)} Hz: must be at least {LEAST_HZ:g} Hz: check the unit of the "
+                "frequency"
             )
         if not DAMPING[0] <= z <= DAMPING[1]:
             raise InputError(
