@@ -106,3 +106,19 @@ def test_the_row_of_states_is_the_cheapest_of_all(seed):
     got = _pallet.cheapest_row(ranges, starts, angle, cost, of, first, length, most, turn, 0, chosen)
     assert got == last
     assert cost_of([flat[k] for k in chosen[:last]]) == pytest.approx(best[0], rel=1e-12)
+
+
+def test_a_window_of_whole_steps_has_the_same_states_however_its_ends_are_rounded():
+    half = math.radians(12.0)
+    angles = np.linspace(0.1, 6.2, 400)
+    ranges = np.column_stack([angles - half, angles + half])
+    counts = set()
+    for row in ranges:
+        room = [np.empty(60), np.empty(60), np.empty(60, dtype=np.int64), np.zeros(2, dtype=np.int64)]
+        counts.add(
+            _pallet.states_of(
+                row[None], np.array([0, 1]), np.array([math.nan]), 0.05, math.radians(2.0), 5, 60, 0.3, *room
+            )
+        )
+    # 24 degrees in steps of 2
+    assert counts == {12}

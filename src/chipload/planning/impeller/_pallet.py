@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+#: of a step, by how much a range may be wider than whole steps without one more state
+ROUNDED = 1e-9
+
 
 @njit(cache=True, nogil=True)
 def near(angle: float) -> float:
@@ -33,7 +36,8 @@ def states_of(
         first[i] = filled
         for k in range(starts[i], starts[i + 1]):
             low, high = ranges[k, 0], ranges[k, 1]
-            count = min(max(math.ceil((high - low) / step), fewest), most)
+            # a window of whole steps has so many states, however its ends are rounded
+            count = min(max(math.ceil((high - low) / step - ROUNDED), fewest), most)
             for j in range(count):
                 B = low + (high - low) * (j + 0.5) / count
                 short = max(1.0 - min(B - low, high - B) / wanted, 0.0) if wanted > 0.0 else 0.0

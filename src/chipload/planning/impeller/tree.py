@@ -51,17 +51,24 @@ def tree_of(points: Floats, most: int = 12) -> Tree:
     nodes, spans = np.zeros((total, 4)), np.zeros((total, 2), dtype=np.int64)
     nodes[:, 3] = -1.0
     spans[0] = 0, m
-    for k in range(total):
-        a, b = spans[k]
-        if b > a:
-            p = points[order[a:b]]
-            low, high = p.min(axis=0), p.max(axis=0)
+    # level by level: the spans of a level follow one another and hold all points
+    for level in range(levels + 1):
+        first = 2**level - 1
+        of = slice(first, 2 * first + 1)
+        some = np.flatnonzero(spans[of, 1] > spans[of, 0]) + first
+        if len(some):
+            begins = spans[some, 0]
+            p = points[order]
+            low, high = np.minimum.reduceat(p, begins), np.maximum.reduceat(p, begins)
             centre = 0.5 * (low + high)
-            nodes[k, :3], nodes[k, 3] = centre, np.sqrt(((p - centre) ** 2).sum(axis=1).max())
-            if k < leaves:
-                along = np.argpartition(p[:, (high - low).argmax()], (b - a) // 2)
-                order[a:b] = order[a:b][along]
-        if k < leaves:
-            middle = a + (b - a) // 2
-            spans[2 * k + 1], spans[2 * k + 2] = (a, middle), (middle, b)
+            away = ((p - np.repeat(centre, spans[some, 1] - begins, axis=0)) ** 2).sum(axis=1)
+            nodes[some, :3], nodes[some, 3] = centre, np.sqrt(np.maximum.reduceat(away, begins))
+        if level == levels:
+            break
+        for k, axis in zip(some.tolist(), (high - low).argmax(axis=1).tolist() if len(some) else [], strict=True):
+            a, b = spans[k].tolist()
+            order[a:b] = order[a:b][np.argpartition(p[a:b, axis], (b - a) // 2)]
+        middle = spans[of, 0] + (spans[of, 1] - spans[of, 0]) // 2
+        below = slice(2 * first + 1, 4 * first + 3)
+        spans[below] = np.column_stack([spans[of, 0], middle, middle, spans[of, 1]]).reshape(-1, 2)
     return Tree(order, nodes, spans, leaves)
