@@ -89,6 +89,19 @@ def test_each_program_begins_with_what_the_one_before_leaves(side_and_top) -> No
     assert twice[1].columns["chip_volume_mm3"].sum() == pytest.approx(0.0, abs=1e-6)
 
 
+def test_earlier_programs_only_make_room() -> None:
+    """Of a second slot in the same place nothing is left, and where the slots cross only what is beside the first."""
+    side = written(slot(1, True))
+    same, across = (removal_of_programs([second], BLOCK, MACHINE, None, earlier=[side])[0] for second in (
+        written(slot(2, True)), written(slot(2, False, 12.0))
+    ))  # fmt: skip
+    assert same.columns["chip_volume_mm3"].sum() == pytest.approx(0.0, abs=1e-6)
+    assert across.columns["chip_volume_mm3"].sum() == pytest.approx(12.0 * WIDE * LONG, rel=2e-3)
+    assert across.columns["line"].tolist() == written(slot(2, False, 12.0)).read.program.line[1:].tolist()
+    # what the first slot takes is not counted
+    assert across.stock[0] - across.stock[1] == pytest.approx(12.0 * WIDE * LONG, rel=2e-3)
+
+
 def test_what_needs_outlines_is_refused_without_them() -> None:
     given = inputs_of({1: tool_with_teeth(CUTTER, slot(1, True), None)}, BLOCK, MACHINE, None)
     with pytest.raises(chipload.InputError, match=r"outlines: without them checks\.loose_stock"):

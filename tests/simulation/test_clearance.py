@@ -122,3 +122,34 @@ def test_one_worker_and_two_find_the_same():
     one, two = (clearance(steps, {1: cutting_part(BULL)}, points, 3.0, 1e-3, workers=w) for w in (1, 2))
     assert one.distance.tobytes() == two.distance.tobytes()
     assert one.step.tobytes() == two.step.tobytes()
+
+
+@pytest.mark.parametrize(("low", "far"), [(15.55, 0.05), (29.0, 2.0)], ids=["at the end of the flutes", "in the shank"])
+def test_a_small_block_of_many_points_in_a_shank(low, far):
+    """Cells that nothing can change are left out: every point has its distance from the cylinders of the tool."""
+    cutter = Cutter(10.0, 4, 0.5, 20.0, 40.0, 6e5, shank_diameter=12.0, holder=((25.0, 40.0),))
+    x, y, z = (a.ravel() for a in np.meshgrid(np.linspace(-4, 4, 14), np.linspace(3, 9, 12), np.linspace(0, 6, 12)))
+    points = np.column_stack([x, y, z + low])
+    path = np.array([[-9.0, 5.0, 0.0], [9.0, 5.0, 0.0], [9.0, 8.0, 4.0], [-9.0, 8.0, 4.0]])
+    found = clearance(line(*path), {1: above_cutting(cutter)}, points, far, 1e-4)
+    u = np.linspace(0.0, 1.0, 1500)
+    tips = np.concatenate([path[i] + u[:, None] * (path[i + 1] - path[i]) for i in range(3)])
+    best = np.full(len(points), np.inf)
+    for tip in tips:
+        rho, height = np.hypot(points[:, 0] - tip[0], points[:, 1] - tip[1]), points[:, 2] - tip[2]
+        gap = np.full(len(points), np.inf)
+        for (r0, z0), (r1, z1) in (((5, 20), (6, 20)), ((6, 20), (6, 40)), ((6, 40), (20, 40)), ((20, 40), (20, 65))):
+            at = np.clip(((rho - r0) * (r1 - r0) + (height - z0) * (z1 - z0)) / math.hypot(r1 - r0, z1 - z0) ** 2, 0, 1)
+            gap = np.minimum(gap, np.hypot(rho - r0 - at * (r1 - r0), height - z0 - at * (z1 - z0)))
+        inside = ((height >= 20.0) & (height <= 40.0) & (rho <= 6.0)) | ((height >= 40.0) & (rho <= 20.0))
+        best = np.minimum(best, np.where(inside & (height <= 65.0), -gap, gap))
+    best[best > far] = np.inf
+    near = np.isfinite(best) & np.isfinite(found.distance)
+    assert near.sum() > 50
+    # deep points differ by the distance of two places
+    np.testing.assert_allclose(found.distance[near], best[near], atol=0.07)
+    shallow = near & (best > -0.7)
+    np.testing.assert_allclose(found.distance[shallow], best[shallow], atol=7e-3)
+    assert (found.distance[near] >= best[near] - 1e-2).all()
+    # what is looked for ends where it should
+    assert (np.isfinite(found.distance) == np.isfinite(best))[np.abs(best - far) > 0.07].all()

@@ -32,6 +32,7 @@ class ProgramSequence:
     program : all rows; ``line`` is the number of each, from 1
     times : (n,) float [s], of its rows on the machine
     first : (k + 1,) int, first row of each program, from 0, and the number of rows
+    uncounted : first rows of all that only make room for the others: what they remove is not calculated
     """
 
     program: Program
@@ -41,10 +42,16 @@ class ProgramSequence:
     retractions: tuple[int, ...] = ()
     of_text: bool = False
     skipped: None = None
+    uncounted: int = 0
 
     @staticmethod
-    def of(parts: Sequence[tuple[Program, Floats]]) -> ProgramSequence:
-        """Join programs, each with the times of its rows [s]; a program has a row at least."""
+    def of(parts: Sequence[tuple[Program, Floats]], earlier: int = 0) -> ProgramSequence:
+        """Join programs, each with the times of its rows [s]; a program has a row at least.
+
+        Parameters
+        ----------
+        earlier : number of first programs that only make room for the others
+        """
         programs, times = [], []
         for program, seconds in parts:
             mode = np.array(program.path_mode)
@@ -55,8 +62,9 @@ class ProgramSequence:
         first = np.cumsum([0, *(len(p) for p in programs)])
         joined = Program.join(programs)
         return ProgramSequence(
-            replace(joined, line=np.arange(1, len(joined) + 1)), np.concatenate(times), first.astype(np.int64)
-        )
+            replace(joined, line=np.arange(1, len(joined) + 1)), np.concatenate(times), first.astype(np.int64),
+            uncounted=int(first[earlier]),
+        )  # fmt: skip
 
     def program_at(self, line: int) -> tuple[int, int]:
         """Return the number of the program that a line of the joined program belongs to, and its row there."""

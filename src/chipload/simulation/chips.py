@@ -84,6 +84,7 @@ def remove(
     workers: int = 2,
     loads: bool = True,
     outlines: bool = True,
+    uncounted: int = 0,
     seen: Seen = unseen,
     progress: Progress = silent,
 ) -> Removal:
@@ -106,6 +107,8 @@ def remove(
     loads : False: only what is removed is needed; the loads are 0
     outlines : False: of what is left only the volume is needed: ``stock`` stays as it was, and its volume afterwards is
         that before less the chips
+    uncounted : last line whose steps only make room for those after it: what they remove is not calculated, and their
+        columns and chips are 0
     seen : takes the columns of each block of steps as soon as they are known
 
     Returns
@@ -132,7 +135,7 @@ def remove(
     -----
     O(n m): n steps, m earlier moves near each.
     """
-    setting = RunSettings(cutters, material, resolution, watch, workers, loads=loads)
+    setting = RunSettings(cutters, material, resolution, watch, workers, loads=loads, uncounted=uncounted)
     return _remove_program(
         program, stock, setting, times, keep=keep, accuracy=accuracy, outlines=outlines, seen=seen, progress=progress
     )[0]
@@ -254,10 +257,11 @@ def runs_of_threads(program: Program, stock: LayeredStock, setting: RunSettings,
 def _run_of(setting: RunSettings, program: Program, stock: LayeredStock, *, shank: bool) -> MoveRun:
     """A run of the program by moves, before its first step."""
     fine = setting.resolution
-    return run_by_moves(
+    run = run_by_moves(
         program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm,
         setting.loads, shank=shank,
     )  # fmt: skip
+    return replace(run, uncounted=setting.uncounted)
 
 
 def with_accuracy(removal: Removal, program: Program, before: LayeredStock | None, setting: RunSettings) -> Removal:

@@ -123,6 +123,7 @@ class MoveRun:
     bodies : numbers of tools that are bodies without chips
     earlier : moves that cut the body before the run; they are in ``stock``
     shank : is asked where material stands above the flutes; None: a run that meets some ends
+    uncounted : last line whose steps are made without calculating what they remove
     """
 
     stock: MoveStock | BrickStock
@@ -133,6 +134,7 @@ class MoveRun:
     bodies: tuple[int, ...] = ()
     earlier: EarlierMoves | None = None
     shank: ShankContact | None = None
+    uncounted: int = 0
 
     @property
     def upright(self) -> bool:
@@ -168,11 +170,11 @@ class MoveRun:
         pieces, flank, own = self.corner_slices, self.flank_mm, self._moving(steps)
         p0, p1, tool = steps.p0[own], steps.p1[own], steps.tool[own]
         poses = (p0, p1, steps.a0[own], steps.a1[own])
-        finer = np.where(steps.rapid[own], OF_RAPIDS, 1.0)
+        finer, looked = np.where(steps.rapid[own], OF_RAPIDS, 1.0), steps.line[own] > self.uncounted
         if isinstance(self.stock, BrickStock):
-            found = self.stock.take(*poses, tool, corner_slices=pieces, flank_mm=flank, finer=finer)
+            found = self.stock.take(*poses, tool, corner_slices=pieces, flank_mm=flank, finer=finer, looked=looked)
         else:
-            found = self.stock.take(p0, p1, tool, corner_slices=pieces, flank_mm=flank, finer=finer)
+            found = self.stock.take(p0, p1, tool, corner_slices=pieces, flank_mm=flank, finer=finer, looked=looked)
         if self.shank is not None:
             at = np.flatnonzero(found.above)
             time = (found.instant[at] + 0.5) / found.instants[at]

@@ -162,7 +162,7 @@ def removal_between(whole: Removal, first: int, end: int) -> Removal:
 class RunSettings:
     """What a run keeps to, step after step: see :func:`chipload.simulation.chips.remove`; ``moves`` the run of the
     program, None before it is made; ``workers`` threads; ``loads`` False: the loads are 0; ``other``: a further
-    material, whose loads of the same contact are calculated too.
+    material, whose loads of the same contact are calculated too; ``uncounted``: see :class:`MoveRun`.
     """
 
     cutters: Mapping[int, Cutter]
@@ -173,6 +173,7 @@ class RunSettings:
     moves: MoveRun | None = None
     loads: bool = True
     other: Material | None = None
+    uncounted: int = 0
 
     @property
     def run(self) -> MoveRun:

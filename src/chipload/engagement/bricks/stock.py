@@ -211,6 +211,7 @@ class BrickStock:
         corner_slices: int,
         flank_mm: Mapping[int, float],
         finer: Floats | float = 1.0,
+        looked: NDArray[np.bool_] | bool = True,
     ) -> Engaged:
         """Make steps one after the other and return the engagement of each.
 
@@ -222,10 +223,12 @@ class BrickStock:
         corner_slices : slices of a range of a corner in contact, taken as ``FEW`` at least
         flank_mm : longest slice of the flank by tool number [mm]
         finer : (n,) float, how many times as close its instants are
+        looked : (n,) bool, False: it is made without looking at what it engages
         """
-        each = np.broadcast_to(finer, len(tool))
+        each, seen = np.broadcast_to(finer, len(tool)), np.broadcast_to(looked, len(tool))
         rows, tool, group = self._moves(p0, p1, a0, a1, tool)
-        count = np.where(group > 0, self.instants(rows, tool, each[np.cumsum(group > 0) - 1]), 0)
+        of = np.cumsum(group > 0) - 1
+        count = np.where((group > 0) & seen[of], self.instants(rows, tool, each[of]), 0)
         found = self._run(rows, tool, group, count, corner_slices, flank_mm)
         if not self.tooth_rows:
             return found

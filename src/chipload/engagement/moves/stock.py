@@ -326,6 +326,7 @@ class MoveStock:
         corner_slices: int,
         flank_mm: Mapping[int, float],
         finer: Floats | float = 1.0,
+        looked: NDArray[np.bool_] | bool = True,
     ) -> Engaged:
         """Make steps one after the other and return the engagement of each.
 
@@ -336,8 +337,10 @@ class MoveStock:
         corner_slices : slices of the engaged part of a corner
         flank_mm : longest slice of the flank by tool number [mm]
         finer : (n,) float, how many times as close its instants are
+        looked : (n,) bool, False: it is made without looking at what it engages
         """
-        return self._run(p0, p1, tool, self.instants(p0, p1, tool, finer), corner_slices, flank_mm)
+        instants = np.where(looked, self.instants(p0, p1, tool, finer), 0)
+        return self._run(p0, p1, tool, instants, corner_slices, flank_mm)
 
     def _run(
         self, p0: Floats, p1: Floats, tool: Ints, instants: Ints, pieces: int, flank_mm: Mapping[int, float]

@@ -25,7 +25,8 @@ class ProgramRemoval:
     limits, findings : of the simulation
     energy_balance : as of a track
     loads : whether teeth and material are stated
-    stock : volume [mm^3] before all programs, and after them
+    stock : volume [mm^3] before all programs, and less what those take whose removal is calculated together; not what
+        roughing takes in a channel before them
     contact : (n, 2, 3) float [mm], ends of the contact line of each row, nan where nothing is cut; None: not kept
     """
 

@@ -83,6 +83,7 @@ def removal_of_programs(
     progress: Progress = silent,
     *,
     contacts: bool = False,
+    earlier: Sequence[ImpellerProgram] = (),
 ) -> list[ProgramRemoval]:
     """Return what each program removes, in the order in which they run; a tool number is of one cutter.
 
@@ -90,9 +91,11 @@ def removal_of_programs(
     ----------
     touch : volume that a rapid may remove in one row [mm^3]
     contacts : whether the contact lines of the steps are kept
+    earlier : programs that run before these and only make room for them: what they remove is not calculated
     """
-    sequence = ProgramSequence.of([(p.read.program, p.read.times) for p in programs])
-    tools = {int(p.read.program.tool[0]): tool_with_teeth(p.cutter, p.read.program, terms) for p in programs}
+    run = [*earlier, *programs]
+    sequence = ProgramSequence.of([(p.read.program, p.read.times) for p in run], len(earlier))
+    tools = {int(p.read.program.tool[0]): tool_with_teeth(p.cutter, p.read.program, terms) for p in run}
     inputs = inputs_of(tools, stock, machine, terms)
     try:
         body = stock.layered(sequence.program, tools)
@@ -107,8 +110,8 @@ def removal_of_programs(
         for f in simulation_findings(simulation)
         if f.code not in OF_MACHINE and not (f.code == "rapid-cuts" and taken.get(f.line, math.inf) <= touch)
     ]
-    parts = [_of_program(k, p, sequence, simulation, findings, terms) for k, p in enumerate(programs)]
-    return parts if lines is None else _keep_contact(parts, lines, sequence, simulation)
+    parts = [_of_program(k, p, sequence, simulation, findings, terms) for k, p in enumerate(programs, len(earlier))]
+    return parts if lines is None else _keep_contact(parts, lines, sequence, simulation, len(earlier))
 
 
 class ContactLines:
@@ -131,13 +134,17 @@ class ContactLines:
 
 
 def _keep_contact(
-    found: Sequence[ProgramRemoval], lines: ContactLines, sequence: ProgramSequence, simulation: SimulationResult
+    found: Sequence[ProgramRemoval],
+    lines: ContactLines,
+    sequence: ProgramSequence,
+    simulation: SimulationResult,
+    first: int,
 ) -> list[ProgramRemoval]:
-    """What each program removes, with the contact lines of its rows."""
+    """What each program from the number ``first`` on removes, with the contact lines of its rows."""
     row = np.asarray(simulation.removal.columns["line"]) - 1
     of = np.searchsorted(sequence.first, row, "right") - 1
     every = lines.of_rows(len(row))
-    return [replace(one, contact=every[of == k]) if one.columns else one for k, one in enumerate(found)]
+    return [replace(one, contact=every[of == k]) if one.columns else one for k, one in enumerate(found, first)]
 
 
 def _taken_by_rapids(simulation: SimulationResult) -> dict[int, float]:

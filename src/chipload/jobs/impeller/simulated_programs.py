@@ -59,9 +59,7 @@ def with_removal(
     of: dict[int, ProgramRemoval] = {}
     if parts:
         own = part_of(progress, 0.0, 1.0 / (1 + len(kinds)))
-        found = removal_of_programs([*before, *parts], stock, outcome.machine, terms, touch, own, contacts=contacts)[
-            len(before) :
-        ]
+        found = removal_of_programs(parts, stock, outcome.machine, terms, touch, own, contacts=contacts, earlier=before)
         of |= {id(checked): removal for (_, checked), removal in zip(named.values(), found, strict=True)}
     roughing = [p for p, (_, checked) in zip(parts, named.values(), strict=True) if isinstance(checked, CheckedRough)]
     for k, kind in enumerate(kinds, 1):
@@ -69,8 +67,8 @@ def with_removal(
         first = [*(one.numbered_from(len(kind)) for one in (*before, *roughing))]
         finishing = [ImpellerProgram(name, p.read, p.cutter) for name, p in kind]
         found = removal_of_programs(
-            [*first, *finishing], stock, kind[0][1].machine, terms, touch, own, contacts=contacts
-        )[len(first) :]
+            finishing, stock, kind[0][1].machine, terms, touch, own, contacts=contacts, earlier=first
+        )
         of |= {id(p): removal for (_, p), removal in zip(kind, found, strict=True)}
     return replace_removals(outcome, of)
 

@@ -32,8 +32,8 @@ Ints = NDArray[np.int64]
 
 Grid = tuple[Ints, Ints, Floats, float, Ints]
 
-#: places that are looked at together, and most cells
-BLOCK, CELLS = 4096, 2_000_000
+#: places that are looked at together, most cells, and points of a cell
+BLOCK, CELLS, POINTS = 4096, 2_000_000, 32
 #: a step after all others
 NEVER = np.iinfo(np.int64).max
 
@@ -180,7 +180,8 @@ def clearance(
 def _cells(p: Floats, reach: float) -> Grid:
     """Points sorted into cells: (order, where each cell begins, low corner, side, counts)."""
     low, high = p.min(axis=0), p.max(axis=0)
-    cell = max(reach / 8.0, float(np.cbrt(np.prod(np.maximum(high - low, reach / 8.0)) / CELLS)))
+    volume = float(np.prod(np.maximum(high - low, reach / 8.0)))
+    cell = max(min(reach / 8.0, math.cbrt(volume * POINTS / len(p))), math.cbrt(volume / CELLS))
     count = np.floor((high - low) / cell).astype(np.int64) + 1
     place = np.minimum(((p - low) / cell).astype(np.int64), count - 1)
     key = (place[:, 0] * count[1] + place[:, 1]) * count[2] + place[:, 2]
