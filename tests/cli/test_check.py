@@ -154,6 +154,7 @@ def test_a_folder_is_the_cell_that_its_files_state(tmp_path: Path) -> None:
         "axial_depth_mm = 12.0\nradial_depth_mm = 2.0\nfeed_per_tooth_mm = 0.1\nnoise_um = 1.0\nplace_um = 5.0\n"
         "height_mm = [1.0, 6.0, 11.0]\nerror_um = [38.0, 22.0, 21.0]\n"
     )
+    (folder / "columns.toml").write_text('sample_s = 0.1\n[power]\ncolumn = "P"\nunit = "kW"\n')
     code, out, err = call("check", folder)
     assert (code, err) == (3, "")
     lines = out.splitlines()
@@ -163,12 +164,27 @@ def test_a_folder_is_the_cell_that_its_files_state(tmp_path: Path) -> None:
         "spindle.toml: spindle identified by its power, efficiency 0.81 +- 4 %",
         "modes.toml: 1 mode of a hammer test, 1200 Hz",
         "walls.toml: 1 measured wall of shop with 3 values, for chipload learn-wall",
+        "columns.toml: columns of a log: power P [kW], a row each 0.1 s; for --columns",
         "wrong.toml: refused: ",
         "job.toml: names al7075-t6, which was learned further: shop.toml (shop) knows it better",
     ):
         assert any(line.startswith(said) for line in lines), (said, lines)
     (tmp_path / "none").mkdir()
     assert call("check", tmp_path / "none")[0] == 2
+
+
+def test_a_log_is_named_by_its_columns(tmp_path: Path) -> None:
+    log = tmp_path / "monday.csv"
+    log.write_text("time_s,power_w,line\n0,100,1\n1,,2\n2.5,200,3\n")
+    code, out, _ = call("check", log)
+    assert (code, out.splitlines()) == (0, [
+        "finding: line 3: 1 rows are left out: a number is missing or above 1e+30 (log-row)",
+        "monday.csv: a log of 2 samples over 2.5 s: power, line",
+    ])  # fmt: skip
+    log.write_text("hz,re,im\n1,2,3\n")
+    code, _, err = call("check", log)
+    assert code == 2
+    assert "no column of time and of current, power or torque by a known name" in err
 
 
 def test_a_program_is_checked_without_a_machine() -> None:

@@ -170,6 +170,19 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
     return SpindleLog(**made), findings
 
 
+def columns_text(path: str | Path) -> str:
+    """Return the columns that a table of columns (TOML) states, in words.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_log` of the table.
+    """
+    stated = _check_columns(path)
+    each = [f"{quantity} {name}{f' [{unit}]' if unit else ''}" for quantity, (name, unit) in stated.wanted.items()]
+    return ", ".join([*each, *([f"a row each {stated.sample:g} s"] if stated.sample is not None else [])])
+
+
 @dataclass(frozen=True)
 class LogLayout:
     """Where the quantities of a log stand in a row.

@@ -49,6 +49,8 @@ def _toml_kind(path: Path) -> Callable[[Path], list[str]] | None:
         return _walls
     if any(c.key in values for c in CAPABILITIES):
         return None
+    if any(isinstance(table, dict) and "column" in table for table in values.values()):
+        return _columns
     return next((reader for keys, reader in BY_KEYS if keys <= set(values)), None)
 
 
@@ -182,6 +184,22 @@ def _walls(path: Path) -> list[str]:
     return [f"{path.name}: {number} of {prior.name} with {values} values, for chipload learn-wall"]
 
 
+def _columns(path: Path) -> list[str]:
+    from chipload.control.logs import columns_text
+
+    return [f"{path.name}: columns of a log: {columns_text(path)}; for --columns"]
+
+
+def _log(path: Path) -> list[str]:
+    from chipload.control.logs import read_log
+
+    log, findings = read_log(path)
+    names = ", ".join(key for key, value in vars(log).items() if value is not None and key != "time")
+    seconds = number_text(log.time[-1] - log.time[0])
+    count = f"{len(log.time)} sample{'' if len(log.time) == 1 else 's'}"
+    return [*(f"finding: {f}" for f in findings), f"{path.name}: a log of {count} over {seconds} s: {names}"]
+
+
 def _model(path: Path) -> list[str]:
     from chipload.geometry.step_faces import read_faces
     from chipload.geometry.step_roles import roles_of
@@ -244,5 +262,5 @@ BY_KEYS: tuple[tuple[set[str], Callable[[Path], list[str]]], ...] = (
 #: how files are read that are no TOML, by their ending
 BY_ENDING: dict[str, Callable[[Path], list[str]]] = {
     ".step": _model, ".stp": _model, ".stl": _mesh, ".dxf": _drawing_lines, ".ini": _ini,
-    ".tbl": _tools, ".fctb": _tool_bit,
+    ".tbl": _tools, ".fctb": _tool_bit, ".csv": _log, ".parquet": _log,
 }  # fmt: skip
