@@ -27,6 +27,7 @@ class Wheel:
     thickness: float = 3.0
     first: float = 0.0
     offset: float = 0.0
+    foot: float = 0.0
 
     def thick(self, s: Floats) -> Floats:
         """Thickness round the axis [mm]."""
@@ -37,10 +38,15 @@ class Wheel:
         """(n, 2) r and z of places."""
         return self.hub(s) + v[:, None] * (self.shroud(s) - self.hub(s))
 
+    def width(self, s: Floats, v: Floats) -> Floats:
+        """Thickness [mm]; below a tenth of the height both sides spread by ``foot``, as quarters of an ellipse."""
+        x = np.clip(1.0 - 10.0 * v, 0.0, 1.0)
+        return self.thick(s) * (1.0 + 2.0 * self.foot * (1.0 - np.sqrt(1.0 - x**2)) / self.thickness)
+
     def side(self, s: Floats, v: Floats, sign: int) -> Floats:
         """Points (n, 3) of a side of the first blade."""
         m = self.meridian(s, v)
-        a = self.offset + self.wrap(s, v) + sign * 0.5 * self.thick(s) / m[:, 0]
+        a = self.offset + self.wrap(s, v) + sign * 0.5 * self.width(s, v) / m[:, 0]
         return np.stack([m[:, 0] * np.cos(a), m[:, 0] * np.sin(a), m[:, 1]], axis=-1)
 
     def off(self, p: Floats, sign: int) -> Floats:
@@ -56,7 +62,7 @@ class Wheel:
             J = np.stack([(self.meridian(s + h, v) - m) / h, (self.meridian(s, v + h) - m) / h], axis=-1)
             step = np.linalg.solve(J, (goal - m)[..., None])[..., 0]
             s, v = s + step[:, 0], v + step[:, 1]
-        angle = self.offset + self.wrap(s, v) + sign * 0.5 * self.thick(s) / goal[:, 0]
+        angle = self.offset + self.wrap(s, v) + sign * 0.5 * self.width(s, v) / goal[:, 0]
         pitch = 2.0 * np.pi / self.blades
         apart = (np.arctan2(p[:, 1], p[:, 0]) - angle + 0.5 * pitch) % pitch - 0.5 * pitch
         return np.abs(goal[:, 0] * apart)

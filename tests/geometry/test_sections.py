@@ -49,6 +49,15 @@ def test_sides_face_their_theta():
     assert made.turned(0.5).plus.at(0.5, 0.5)[0] @ at > 0.0
 
 
+def test_a_section_may_begin_at_the_other_edge():
+    """Two of five sections begin at their trailing edge: each side is one face all the way up."""
+    rolled = tuple(np.roll(p[:-1], 79, axis=0) if k in (0, 3) else p[:-1] for k, p in enumerate(blade()))
+    made, same = loft(rolled), loft(blade())
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.05, 0.95, 19), np.linspace(0.0, 1.0, 9), indexing="ij"))
+    np.testing.assert_allclose(made.plus.at(u, v), same.plus.at(u, v), atol=0.05)
+    np.testing.assert_allclose(made.minus.at(u, v), same.minus.at(u, v), atol=0.05)
+
+
 def test_units_and_columns(tmp_path):
     p = section(10.0)
     r, theta = np.hypot(p[:, 0], p[:, 1]), np.arctan2(p[:, 1], p[:, 0])

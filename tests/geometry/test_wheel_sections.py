@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -40,6 +42,19 @@ def test_blades_of_a_mesh_are_those_of_the_formula(wheels: tuple[Wheel, ...], wi
     for curve, stated, least in ((hub, wheels[0].hub, 0.01), (shroud, wheels[0].shroud, 0.1)):
         assert cKDTree(stated(s)).query(curve.points)[0].max() < least
         assert np.abs(curve.points[[-1, 0]] - stated(np.array([0.0, 1.0]))).max() < 0.1
+
+
+def test_what_is_stated_holds_in_fillets() -> None:
+    """A foot that spreads by 2 mm on both sides, above 2 % of the height, against the formula in points."""
+    wheel = replace(radial(3), foot=2.0)
+    found = wheel_blades(wheel_mesh((wheel,), along=41, up=33, round_axis=90))
+    assert found is not None
+    assert 0.02 < found.off < 0.12
+    blade = loft(check_sections(found.bodies[0]))
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.1, 0.9, 12), np.linspace(0.02, 1.0, 21), indexing="ij"))
+    s, h = (x.ravel() for x in np.meshgrid(np.linspace(0.0, 1.0, 501), np.linspace(0.0, 1.0, 301), indexing="ij"))
+    for sign, side in ((1, blade.plus), (-1, blade.minus)):
+        assert cKDTree(wheel.side(s, h, sign)).query(side.at(u, v))[0].max() < found.off + 0.05
 
 
 def test_a_blade_that_differs_is_reported() -> None:

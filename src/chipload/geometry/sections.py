@@ -14,6 +14,7 @@ states it.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -191,7 +192,12 @@ def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
     u = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     u[0], u[-1] = 0.0, 1.0
     halves = [_halves(p) for p in sections]
-    sides = [np.array([_read(half[k], u) for half in halves]) for k in range(2)]
+    both = [[_read(half[k], u) for k in range(2)] for half in halves]
+    for before, pair in itertools.pairwise(both):
+        # a section may begin at either edge: its sides are those that face as the sides of the one before
+        if float(((before[0] - before[1]) * (pair[0] - pair[1])).sum()) < 0.0:
+            pair.reverse()
+    sides = [np.array([pair[k] for pair in both]) for k in range(2)]
     theta = [np.unwrap(np.arctan2(s[..., 1], s[..., 0]), axis=1) for s in sides]
     ahead = np.angle(np.exp(1j * (theta[0] - theta[1]))).mean() > 0.0
     plus, minus = sides if ahead else sides[::-1]

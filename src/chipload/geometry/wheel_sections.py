@@ -37,7 +37,7 @@ ALIKE = 0.02
 #: a ring of a blade: greatest width over its length, least length along the channel, least angle about the axis [rad]
 SLENDER, ALONG, WRAP = 0.35, 0.2, 0.05
 #: heights between which vertices are compared with the blade, and the share of its length at each edge that is left out
-COMPARED, EDGE = (0.03, 0.97), 0.03
+COMPARED, EDGE = (0.01, 0.99), 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +208,10 @@ def _body(rows: list[list[Floats]], start: Floats) -> tuple[Floats, ...]:
                 )
             before = min(alike, key=lambda r: float(np.linalg.norm(r.mean(axis=0) - before.mean(axis=0))))
             rings[k] = before
-    shaped = [_section(rings[k]) for k in range(len(rows))]
+    # an edge is blunt where it is in all sections, so that points of equal number lie above one another
+    found = [_edges(rings[k], _lengths(rings[k]), (True, True))[1] for k in range(len(rows))]
+    blunt = all(b[0] for b in found), all(b[1] for b in found)
+    shaped = [_section(rings[k], blunt) for k in range(len(rows))]
     v = np.array(HEIGHTS)
     whole = np.stack(shaped)
     ends = [_extrapolate(whole[:3], v[:3], 0.0), _extrapolate(whole[-3:], v[-3:], 1.0)]
@@ -221,13 +224,16 @@ def _extrapolate(sections: Floats, v: Floats, at: float) -> Floats:
     return np.asarray(np.tensordot(share, sections, axes=1), dtype=np.float64)
 
 
-def _section(ring: Floats) -> Floats:
+def _lengths(ring: Floats) -> Floats:
+    """Lengths (n + 1,) along a ring from its first point and back to it."""
+    return np.concatenate([[0.0], np.linalg.norm(np.diff(np.concatenate([ring, ring[:1]]), axis=0), axis=1).cumsum()])
+
+
+def _section(ring: Floats, blunt: tuple[bool, bool]) -> Floats:
     """A section (n, 3) from the middle of its edge of greater z, along one side and back along the other."""
     closed = np.concatenate([ring, ring[:1]])
-    at = np.concatenate([[0.0], np.linalg.norm(np.diff(closed, axis=0), axis=1).cumsum()])
-    edges = _edges(ring, at)
-    if _along(closed, at, edges[0][1])[2] < _along(closed, at, edges[1][1])[2]:
-        edges = edges[::-1]
+    at = _lengths(ring)
+    edges, _ = _edges(ring, at, blunt)
     (a0, _, a1), (b0, _, b1) = edges
     whole = float(at[-1])
     shape = [_edge(closed, at, edge) for edge in edges]
@@ -271,19 +277,21 @@ def _side(closed: Floats, at: Floats, ends: tuple[float, float]) -> Floats:
     return _spline_points(np.concatenate([first[None], points[kept], last[None]]))
 
 
-def _edges(ring: Floats, at: Floats) -> list[tuple[float, float, float]]:
-    """Both edges of a ring: the lengths along it at which each begins, has its middle, and ends.
+def _edges(
+    ring: Floats, at: Floats, blunt: tuple[bool, bool]
+) -> tuple[list[tuple[float, float, float]], tuple[bool, bool]]:
+    """Both edges of a ring, that of greater z first, and whether each is blunt; what must not be so is taken as round.
 
-    An edge lies between its two corners, where there are two; a round one goes ``ROUND_EDGE`` of the ring to both sides
-    of the outermost point.
+    An edge is the lengths along the ring at which it begins, has its middle, and ends. A blunt edge lies between its
+    two corners; a round one goes ``ROUND_EDGE`` of the ring to both sides of the outermost point.
     """
     apart = np.sqrt(((ring[:, None] - ring[None]) ** 2).sum(axis=2))
     i, j = (int(x) for x in np.unravel_index(int(apart.argmax()), apart.shape))
     whole = float(at[-1])
     between = np.abs((at[:-1, None] - at[None, :-1] + 0.5 * whole) % whole - 0.5 * whole)
     thick = float(np.median(np.where(between > OPPOSITE * whole, apart, np.inf).min(axis=1)))
-    out = []
-    for k in (i, j):
+    out, flags = [], []
+    for k, may in zip((i, j) if ring[i, 2] >= ring[j, 2] else (j, i), blunt, strict=True):
         away = (at[:-1] - at[k] + 0.5 * whole) % whole - 0.5 * whole
         near = np.flatnonzero(np.abs(away) < BLUNT * thick)
         turn = np.array([_turn(ring, at, int(c), WINDOW * thick) for c in near])
@@ -291,10 +299,11 @@ def _edges(ring: Floats, at: Floats) -> list[tuple[float, float, float]]:
             float(away[c]) for c, t in zip(near, turn, strict=True)
             if t > CORNER and t == turn[np.abs(away[near] - away[c]) < WINDOW * thick].max()
         ]  # fmt: skip
-        low, high = (min(span), max(span)) if len(span) > 1 else (-ROUND_EDGE * whole, ROUND_EDGE * whole)
+        flags.append(may and len(span) > 1)
+        low, high = (min(span), max(span)) if flags[-1] else (-ROUND_EDGE * whole, ROUND_EDGE * whole)
         begin = float(at[k]) + low
         out.append((begin, begin + 0.5 * (high - low), begin + high - low))
-    return out
+    return out, (flags[0], flags[1])
 
 
 def _turn(ring: Floats, at: Floats, k: int, window: float) -> float:
