@@ -104,7 +104,7 @@ def test_the_slider_moves_everything(square) -> None:
     page.wait_for_function("!document.querySelector('.cl-where').textContent.includes('step 1 of')")
     row = int(re.search(r"step (\d+) of", page.inner_text(".cl-where"))[1]) - 1
     assert abs(row - 100) <= 2
-    assert page.inner_text(".cl-where").startswith(f"{T[row]:.3f} of 20 s")
+    assert page.inner_text(".cl-where").startswith(f"{T[row]:.2f} of 20.00 s")
     page.keyboard.press("ArrowRight")
     stands_at(page, row + 1)
 
