@@ -167,7 +167,7 @@ def test_a_length_is_measured_on_the_stock(cut) -> None:
     # near corners and edges of the clamp, a box of 10 x 14 x 24 mm: they are caught, so the lengths are exact
     for first, second, length, caught in (
         ([46.4, 2.4, 24], [55.6, 2.4, 24], "10 mm dX 10 dY 0 dZ 0", "corner to corner"),
-        ([46.4, 15.6, 24], [55.6, 2.4, 24], "17.2 mm dX 10 dY -14 dZ 0", "corner to corner"),
+        ([46.4, 15.6, 24], [55.6, 2.4, 24], "17.205 mm dX 10 dY -14 dZ 0", "corner to corner"),
         ([46.4, 15.6, 24], [55.6, 9, 24], None, "corner to edge"),
     ):
         page.mouse.click(*pixel(page, first))
