@@ -144,7 +144,7 @@ CASES = (
     case(
         "impeller-neck-in-the-stock",
         "material in the way of the shank, which no roughing has taken",
-        stated("stock", low_mm=(98.0, 4.0, 30.0), high_mm=(104.0, 12.0, 33.0)),
+        stated("stock", low_mm=(98.0, 4.0, 30.0), high_mm=(104.0, 84.0, 33.0)),
         "exceeds",
         "collision",
     ),
