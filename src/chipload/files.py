@@ -6,6 +6,7 @@ folder, and is locked while its writer runs. An unlocked one was left by a kille
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import ctypes
 import difflib
@@ -127,6 +128,22 @@ def read_regular(path: str | Path, label: str, most: int, remedy: str = "split i
         if len(data) > most:
             raise InputError(f"{label}: more than {most} bytes: must be at most {most} bytes: {remedy}")
         return data
+
+
+def decode_text(data: bytes) -> str:
+    """The text of a file that others wrote: UTF-16 where a byte order mark says so, else UTF-8, else Latin-1.
+
+    Examples
+    --------
+    >>> [decode_text("Ø10".encode(kind)) for kind in ("utf-8", "utf-8-sig", "utf-16", "latin-1")]
+    ['Ø10', 'Ø10', 'Ø10', 'Ø10']
+    """
+    if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return data.decode("utf-16", "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
 
 
 def hash_of(path: str | Path) -> str:

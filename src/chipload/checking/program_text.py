@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipload.checking.outcome import ChangedText
 from chipload.errors import InputError
-from chipload.files import read_regular
+from chipload.files import decode_text, read_regular
 from chipload.machine.machine import Machine
 from chipload.program import heidenhain
 from chipload.program.control import control_named, is_cl_data
@@ -47,7 +48,10 @@ def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> t
             f"{key}: {path.name} is {kind}: {words} are changed in NC texts of LinuxCNC, Fanuc or Sinumerik: "
             "convert it first (chipload convert)"
         )
-    text = read_regular(path, path.name, LARGEST_FILE).decode("utf-8", "surrogateescape")
+    data = read_regular(path, path.name, LARGEST_FILE)
+    wide = data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    # bytes that are no UTF-8 are written as they were
+    text = decode_text(data) if wide else data.decode("utf-8", "surrogateescape")
     lone = text.replace("\r\n", "\n").find("\r")
     if lone >= 0:
         raise InputError(f"{path.name}: a line ends with CR alone: write LF or CR LF to change its {words}")
@@ -67,7 +71,7 @@ def text_with_feeds(text: str, dialect: str, lines: Mapping[int, float]) -> str:
 
 def read_as(text: str) -> str:
     """Return the text as a reader of the file receives it."""
-    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    return decode_text(text.encode("utf-8", "surrogateescape"))
 
 
 def straight(program: Program, words: str) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError, Severity
-from chipload.files import read_regular
+from chipload.files import decode_text, read_regular
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
 from chipload.program.apt.cutters import read_cutters
@@ -396,7 +396,7 @@ def read_tools(path: str | Path) -> ToolTable:
         The file cannot be read or an entry is wrong.
     """
     path = Path(path)
-    text = read_regular(path, path.name, LARGEST_TABLE, "not a tool table").decode("utf-8", "replace")
+    text = decode_text(read_regular(path, path.name, LARGEST_TABLE, "not a tool table"))
     return read_tool_table(text, name=path.name)[0]
 
 

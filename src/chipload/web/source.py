@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import ChiploadError
+from chipload.files import decode_text
 from chipload.machine.machine import machine_named, machine_names
 from chipload.program.apt.reader import read_apt_file
 from chipload.program.motions import is_arc, straighten_arcs
@@ -151,4 +152,4 @@ def _read_axes(path: Path, result: PageResult) -> Program | None:
 
 
 def _lines(path: Path) -> list[str]:
-    return path.read_bytes().decode("utf-8", "replace").splitlines()
+    return decode_text(path.read_bytes()).splitlines()

@@ -13,7 +13,7 @@ import numpy as np
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import cutter_from_table
 from chipload.errors import Finding, InputError, Severity, group_findings
-from chipload.files import read_regular
+from chipload.files import decode_text, read_regular
 from chipload.jobs.drafts.comments import SIZE_ALONE, Box, Header, read_header
 from chipload.jobs.drafts.cutters import cutter_table, size_of_name
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
@@ -203,7 +203,7 @@ def _text(path: Path, apt: bool) -> str:
     try:
         return apt_text(path) if apt else gcode_text(path)
     except InputError:
-        return read_regular(path, path.name, _LARGEST).decode("latin-1")
+        return decode_text(read_regular(path, path.name, _LARGEST))
 
 
 def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None) -> _Chosen:

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Literal
 
 from chipload.errors import Finding, InputError
-from chipload.files import read_regular
+from chipload.files import decode_text, read_regular
 from chipload.program.apt.frames import Coordinates
 from chipload.program.apt.interpreter import AptInterpreter
 from chipload.program.apt.records import LONGEST_TEXT, records
@@ -95,4 +95,4 @@ def apt_text(path: Path) -> str:
     InputError
         It cannot be read or is too large.
     """
-    return read_regular(path, path.name, LONGEST_TEXT).decode("utf-8-sig", "replace")
+    return decode_text(read_regular(path, path.name, LONGEST_TEXT))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from chipload.errors import InputError
-from chipload.files import is_file, read_regular
+from chipload.files import decode_text, is_file, read_regular
 from chipload.program.gcode.dialect import Dialect, NotReadError
 from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.interpreter import BlockInterpreter
@@ -443,7 +443,7 @@ class Flow:
             path = next((p for p in paths if p.parent == root and is_file(p)), paths[0])
             found = path.parent == root and is_file(path)
             data = read_regular(path, path.name, LARGEST_FILE) if found else b""
-            text = data.decode("utf-8", "replace").replace("\r\n", "\n")
+            text = decode_text(data).replace("\r\n", "\n")
             self._files[label] = read_source(text, path.name) if found else None
         return self._files[label]
 

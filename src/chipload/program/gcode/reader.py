@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 from chipload.errors import Finding, InputError
-from chipload.files import read_regular
+from chipload.files import decode_text, read_regular
 from chipload.program.commands import Commands
 from chipload.program.control import Control, control_named
 from chipload.program.gcode.controller import Controller
@@ -150,4 +150,4 @@ def gcode_text(path: Path) -> str:
     InputError
         It cannot be read or is too large.
     """
-    return read_regular(path, path.name, LARGEST_FILE).decode("utf-8-sig", "replace")
+    return decode_text(read_regular(path, path.name, LARGEST_FILE))

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from chipload.errors import InputError
-from chipload.files import is_file, read_regular
+from chipload.files import decode_text, is_file, read_regular
 from chipload.program.heidenhain import words
 from chipload.program.heidenhain.din_iso import conversational
 from chipload.program.heidenhain.formula import q_number
@@ -155,7 +155,7 @@ class HeidenhainFlow:
                     path = (root / f"{own}{ending}").resolve()
                     if path.parent == root and is_file(path):
                         data = read_regular(path, path.name, LARGEST_FILE)
-                        self.files[name] = text_of(data.decode("utf-8", "replace"))
+                        self.files[name] = text_of(decode_text(data))
                         return self.files[name]
             return None
         return self.files[name]

@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from chipload.errors import Finding, InputError
-from chipload.files import read_regular
+from chipload.files import decode_text, read_regular
 from chipload.program.commands import Commands, commands_from_rows
 from chipload.program.heidenhain import motions, switches, words
 from chipload.program.heidenhain.cycles import Cycles, call_positions
@@ -121,7 +121,7 @@ def read_heidenhain_file(path: str | Path, **options: object) -> tuple[Commands,
 
 def heidenhain_text(path: Path) -> str:
     """The text of a program's file."""
-    return read_regular(path, path.name, LONGEST_TEXT).decode("utf-8-sig", "replace")
+    return decode_text(read_regular(path, path.name, LONGEST_TEXT))
 
 
 def tool_definitions(text: str) -> dict[int, StatedDiameter]:
