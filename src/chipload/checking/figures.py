@@ -119,10 +119,11 @@ def _files(program: ProgramResult, changed: Mapping[str, ChangedText], result: R
 def _sections(program: ProgramResult, speeds: SpeedResult | None, figures: dict[str, go.Figure]) -> list[str]:
     what, time_s = program_numbers(program), float(program.seconds.sum())
     low, high = what["box_mm"]["low"], what["box_mm"]["high"]
-    box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
+    box = ", ".join(f"{x} {number_text(a)} to {number_text(b)}" for x, a, b in zip("XYZ", low, high, strict=True))
     body = [
         f"<h2>{escape(program.name)} on {escape(program.machine.name)}</h2>",
-        f"<p>{what['motions']} motions, {what['cutting_mm']:.5g} mm at feed and {what['rapid_mm']:.5g} mm of rapids, "
+        f"<p>{what['motions']} motions, {number_text(what['cutting_mm'])} mm at feed and "
+        f"{number_text(what['rapid_mm'])} mm of rapids, "
         f"{number_text(time_s / 60.0)} min; {box} mm; tools {escape(', '.join(map(str, what['tools'])))}.</p>",
         "<h3>Feed over time</h3>",
         figure("feed", feed_figure(program), figures),
@@ -140,23 +141,24 @@ def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[st
     what, c = operation_numbers(simulation, time_s), simulation.removal.columns
     force, torque, power = what["force_n"], what["torque_nm"], what["power_w"]
     rows = [
-        [f"force {x} on the cutter [N]", _mean(force[x]), f"{force[x]['max']:.4g}", f"{force[x]['min']:.4g}"]
+        [f"force {x} on the cutter [N]", _mean(force[x]), number_text(force[x]["max"]), number_text(force[x]["min"])]
         for x in "xyz"
     ]
-    rows += [["normal force on the surface that is left [N]", "", f"{force['normal_max']:.4g}", ""]]
-    rows += [["torque [N m]", _mean(torque), f"{torque['max']:.4g}", ""]]
-    rows += [["power [W]", f"{power['mean']:.4g}", f"{power['max']:.4g}", ""]]
+    rows += [["normal force on the surface that is left [N]", "", number_text(force["normal_max"]), ""]]
+    rows += [["torque [N m]", _mean(torque), number_text(torque["max"]), ""]]
+    rows += [["power [W]", number_text(power["mean"]), number_text(power["max"]), ""]]
     if what["form_error_um"]["points"]:
-        ends = (f"{what['form_error_um'][key]:.4g}" for key in ("greatest", "least"))
+        ends = (number_text(what["form_error_um"][key]) for key in ("greatest", "least"))
         rows += [["form error of the part [\u00b5m]", "", *ends]]
-    rows += [["deflection [\u00b5m]", "", f"{what['deflection_um']['max']:.4g}", ""]]
+    rows += [["deflection [\u00b5m]", "", number_text(what["deflection_um"]["max"]), ""]]
     rigid = ""
     if simulation.rigid:
         rigid = f" Deflections are lower bounds: {', '.join(simulation.rigid)} not stated and taken as rigid."
     body = [
         "<h2>Chips, force, torque, power</h2>",
-        f"<p>{what['steps']} steps; {what['chip_volume_mm3']:.6g} mm\u00b3 of chips, stock less by "
-        f"{what['removed_mm3']:.6g} mm\u00b3; greatest chip thickness {what['chip_max_mm']['max']:.4g} mm; "
+        f"<p>{what['steps']} steps; {number_text(what['chip_volume_mm3'])} mm\u00b3 of chips, stock less by "
+        f"{number_text(what['removed_mm3'])} mm\u00b3; greatest chip thickness "
+        f"{number_text(what['chip_max_mm']['max'])} mm; "
         f"{what['films_mm3']:.2g} mm\u00b3 in films thinner than the tolerance.</p>",
         f"<p>Time on the machine: {number_text(what['cutting_s'])} s in cut, {number_text(what['air_cut_s'])} "
         "s in air, "
@@ -170,7 +172,7 @@ def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[st
     body += workpiece_section(simulation, figures)
     chip = simulation.removal.piece
     if chip is not None:
-        title = f"step {chip.step}, layer at z = {chip.height:.4g} mm"
+        title = f"step {chip.step}, layer at z = {number_text(chip.height)} mm"
         drawn = diagram_figure(chip.move, chip.cutter, chip.height, chip.before, title=title)
         body += [
             "<h3>A chip</h3>",
@@ -187,7 +189,7 @@ def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[st
 def _mean(values: Mapping[str, Any]) -> str:
     """Return a mean as a text, with twice its standard deviation if that is known."""
     sd = values["mean_sd"]
-    return f"{values['mean']:.4g}" if sd is None else f"{values['mean']:.4g} \u00b1 {2.0 * sd:.2g}"
+    return number_text(values["mean"]) if sd is None else f"{number_text(values['mean'])} \u00b1 {2.0 * sd:.2g}"
 
 
 def loads_along_time(simulation: SimulationResult) -> go.Figure:
@@ -276,7 +278,7 @@ def _slowest(read: ProgramResult) -> str:
     order = np.argsort(-read.seconds, kind="stable")[:SLOWEST]
     whole = max(float(read.seconds.sum()), 1e-300)
     rows = [
-        [str(int(read.lines[k])), f"{read.seconds[k]:.4g}", f"{100.0 * read.seconds[k] / whole:.3g}"]
+        [str(int(read.lines[k])), number_text(read.seconds[k]), f"{100.0 * read.seconds[k] / whole:.3g}"]
         for k in order
         if read.seconds[k] > 0.0
     ]

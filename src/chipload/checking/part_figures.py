@@ -70,7 +70,7 @@ def section(
         what = part_numbers.numbers(left, columns)
         gouge, excess, span = what["gouge_mm"], what["excess_mm"], span_of(left, columns)
         rows = [
-            [name, f"{v['max']:.4g}", str(v["line"] or ""), place_text(v["place"] or [])]
+            [name, number_text(v["max"]), str(v["line"] or ""), place_text(v["place"] or [])]
             for name, v in (("deepest gouge [mm]", gouge), ("highest excess [mm]", excess))
         ]
         body += [
@@ -93,7 +93,7 @@ def section(
         t = columns["t_s"]
         rows = [
             [
-                str(c.line), c.what, c.into, f"{c.depth_mm:.3g}", f"{float(t[c.step]):.4g}",
+                str(c.line), c.what, c.into, f"{c.depth_mm:.3g}", number_text(float(t[c.step])),
                 place_text(c.at),
             ]
             for c in collisions[:LISTED]

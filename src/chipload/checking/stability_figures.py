@@ -16,6 +16,7 @@ from chipload.checking.stability import (
     stability_numbers,
 )
 from chipload.checking.stability_watch import engaged_edge
+from chipload.number_text import number_text
 from chipload.report.sheet import figure, table
 from chipload.result.limits import Columns
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
@@ -45,12 +46,12 @@ def stability_sections(
     if what["margin_min"] is None:
         return [*body, "<p>No margin is known.</p>"]
     over = " or more" if what["margin_min"] >= MOST_MARGIN else ""
-    rows = [["least stability margin", f"{what['margin_min']:.4g}{over}"], ["line", str(what["line"])]]
+    rows = [["least stability margin", f"{number_text(what['margin_min'])}{over}"], ["line", str(what["line"])]]
     if what["chatter_hz"]:
-        rows += [["frequency there [Hz]", f"{what['chatter_hz']:.4g}"], ["mode", escape(str(what["mode"]))]]
-    rows += [["tool", str(what["tool"])], ["spindle speed [rpm]", f"{what['speed_rpm']:.6g}"]]
+        rows += [["frequency there [Hz]", number_text(what["chatter_hz"])], ["mode", escape(str(what["mode"]))]]
+    rows += [["tool", str(what["tool"])], ["spindle speed [rpm]", number_text(what["speed_rpm"])]]
     if what["speed_rpm_advised"] is not None:
-        advised = f"{what['speed_rpm_advised']:g}, margin {what['margin_advised']:.4g}"
+        advised = f"{what['speed_rpm_advised']:g}, margin {number_text(what['margin_advised'])}"
         rows.append(["speed with the greatest margin [rpm]", advised])
     process = stability.watch.dynamics.process
     left_out = "" if process is not None else ", process damping is left out"
@@ -68,15 +69,15 @@ def stability_sections(
     if speeds is not None:
         speed_rows = [
             [
-                str(t.tool), f"{t.lines[0]} to {t.lines[1]}", ", ".join(f"{x:.6g}" for x in t.before), f"{t.rpm:.6g}",
-                f"{t.margin:.3g}",
+                str(t.tool), f"{t.lines[0]} to {t.lines[1]}", ", ".join(map(number_text, t.before)),
+                number_text(t.rpm), f"{t.margin:.3g}",
             ]
             for t in speeds.tools
         ]  # fmt: skip
         head = ["tool", "lines", "before [rpm]", "new [rpm]", "margin expected"]
         body += ["<h3>New speeds</h3>", table(head, speed_rows)]
     if what["windows"]:
-        cells = [[f"{w['low_rpm']:.5g}", f"{w['high_rpm']:.5g}", f"{w['margin']:.3g}"] for w in what["windows"]]
+        cells = [[number_text(w["low_rpm"]), number_text(w["high_rpm"]), f"{w['margin']:.3g}"] for w in what["windows"]]
         head = ["from [rpm]", "to [rpm]", "greatest margin"]
         body += [
             f"<h3>Quiet speeds of tool {what['tool']}</h3>",
@@ -86,7 +87,7 @@ def stability_sections(
     for share in SURE:
         some = what.get(f"windows_{share}_percent")
         if some is not None:
-            cells = [[f"{w['low_rpm']:.5g}", f"{w['high_rpm']:.5g}", f"{w['probability']:.3g}"] for w in some]
+            cells = [[number_text(w["low_rpm"]), number_text(w["high_rpm"]), f"{w['probability']:.3g}"] for w in some]
             body += [
                 f"<h3>Quiet speeds with a probability of {share} %</h3>",
                 '<p class="note">Probability that the cut with the least margin does not chatter at each speed, from '

@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 
 from chipload.checking.bent_workpiece import BentWorkpiece
 from chipload.checking.outcome import SimulationResult
-from chipload.number_text import number_text
+from chipload.number_text import number_text, place_text
 from chipload.report.sheet import figure, table
 from chipload.result.style import FONT, GRID, LIMIT, SCALE
 from chipload.structure.cells.followed import FollowedModes
@@ -26,7 +26,7 @@ def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure
     worst = np.zeros(len(lines))
     np.maximum.at(worst, at.ravel(), c["deflection_workpiece_um"])
     order = np.argsort(-worst, kind="stable")[:12]
-    rows = [[str(int(lines[k])), f"{worst[k]:.4g}"] for k in order if worst[k] > 0.0]
+    rows = [[str(int(lines[k])), number_text(worst[k])] for k in order if worst[k] > 0.0]
     body = [
         "<h2>Deflection of the workpiece</h2>",
         f"<p>{len(own.steps.states)} states of removal in cells of {own.cell:.3g} mm, {own.unknowns} unknowns; the "
@@ -46,13 +46,12 @@ def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure
 
 def bent_section(bent: BentWorkpiece, where: str, figures: dict[str, go.Figure]) -> list[str]:
     """Return the report section on the workpiece in its worst step; ``where`` begins a sentence."""
-    x, y, z = bent.place
     return [
         "<h3>Greatest deflection</h3>",
         f'<p class="note">{where}, under {number_text(float(np.linalg.norm(bent.force)))} N; displacement drawn '
         f"{number_text(_scale(bent), 3)} times.</p>",
         figure("bent", bent_figure(bent), figures),
-        f"<p>A support of 10 N/\u00b5m at ({x:.4g}, {y:.4g}, {z:.4g}) lowers the deflection there from "
+        f"<p>A support of 10 N/\u00b5m at ({place_text(bent.place)}) lowers the deflection there from "
         f"{1e3 * bent.before:.3g} to {1e3 * bent.after:.3g} \u00b5m.</p>",
     ]
 
@@ -60,7 +59,9 @@ def bent_section(bent: BentWorkpiece, where: str, figures: dict[str, go.Figure])
 def _frequencies(modes: FollowedModes, figures: dict[str, go.Figure]) -> list[str]:
     """Return the report section on natural frequencies during removal."""
     f = modes.state_frequency
-    rows = [[str(k + 1), *(f"{value:.4g}" for value in (f[0, k], f[:, k].max(), f[-1, k]))] for k in range(f.shape[1])]
+    rows = [
+        [str(k + 1), *(number_text(value) for value in (f[0, k], f[:, k].max(), f[-1, k]))] for k in range(f.shape[1])
+    ]
     head = ["mode", "before [Hz]", "greatest [Hz]", "after [Hz]"]
     return [
         "<h3>Natural frequencies as material is removed</h3>",

@@ -14,6 +14,7 @@ from chipload.jobs.contour.programs import program_files
 from chipload.jobs.contour.result import limits_of, samples_of
 from chipload.jobs.contour.scene import blanks_of, scene_bytes
 from chipload.machine.machine import Machine
+from chipload.number_text import number_text
 from chipload.planning.result import StrategyResult
 from chipload.report.page import state_cell
 from chipload.report.presentation import Presentation
@@ -100,7 +101,7 @@ def _shown_name(op: Operation) -> str:
 
 
 def _degrees(angle: float) -> str:
-    return f"{angle * 57.29577951308232:.4g}"
+    return number_text(angle * 57.29577951308232)
 
 
 def _name(strategy: str) -> str:
@@ -111,11 +112,13 @@ def _span(s: StrategyResult, key: str) -> str:
     """`min to max` of a summary value."""
     v = s.summary.get(key)
     return (
-        f"{v['min']:.4g} to {v['max']:.4g}" if isinstance(v, Mapping) and "min" in v and "max" in v else _most(s, key)
+        f"{number_text(v['min'])} to {number_text(v['max'])}"
+        if isinstance(v, Mapping) and "min" in v and "max" in v
+        else _most(s, key)
     )
 
 
 def _most(s: StrategyResult, key: str) -> str:
     v = s.summary.get(key)
     v = v.get("max") if isinstance(v, Mapping) else v
-    return f"{v:.4g}" if isinstance(v, (int, float)) else "not known"
+    return number_text(v) if isinstance(v, (int, float)) else "not known"

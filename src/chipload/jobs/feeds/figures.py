@@ -15,7 +15,7 @@ from chipload.checking.result import changed_name
 from chipload.jobs.feeds.numbers import COMPARED, feed_numbers, lines_that_exceed
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
 from chipload.jobs.feeds.result import division_notes, result_of
-from chipload.number_text import number_text
+from chipload.number_text import number_text, place_text
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, table
 from chipload.result import COLUMNS, LimitCheck
@@ -58,13 +58,15 @@ def feed_sections(
     what = feed_numbers(feeds, simulation, checks, time_s, program)
     before, after = what["before"], what["after"]
     gain = 100.0 * (1.0 - time_s / feeds.seconds_before) if feeds.seconds_before > 0.0 else 0.0
-    rows = [["time of the program [s]", f"{feeds.seconds_before:.5g}", f"{time_s:.5g}", ""]]
+    rows = [["time of the program [s]", number_text(feeds.seconds_before), number_text(time_s), ""]]
     if before["feed_mm_min"] is not None:
-        spans = (f"{x['feed_mm_min']['min']:.4g} to {x['feed_mm_min']['max']:.4g}" for x in (before, after))
+        spans = (
+            f"{number_text(x['feed_mm_min']['min'])} to {number_text(x['feed_mm_min']['max'])}" for x in (before, after)
+        )
         rows.append(["feeds that cut [mm/min]", *spans, ""])
     bounds = {check.column.name: f"{check.limit:g}" for check in checks}
     for name in (name for name in COMPARED if name in before and name in after):
-        cells = [f"{before[name]:.4g}", f"{after[name]:.4g}", bounds.get(name, "")]
+        cells = [number_text(before[name]), number_text(after[name]), bounds.get(name, "")]
         rows.append([escape(f"greatest {COLUMNS[name].title}"), *cells])
     body = [
         "<h2>Feeds</h2>",
@@ -81,8 +83,9 @@ def feed_sections(
     if listed:
         cells_of = [
             [
-                str(x["line"]), escape(f"{x['limit']} {x['allowed']:g}"), f"{x['before']:.4g}", f"{x['worst']:.4g}",
-                f"{x['feed_mm_min']:.4g}", "slowest" if x["slowest"] else "", ", ".join(f"{v:.4g}" for v in x["place"]),
+                str(x["line"]), escape(f"{x['limit']} {x['allowed']:g}"), number_text(x["before"]),
+                number_text(x["worst"]), number_text(x["feed_mm_min"]), "slowest" if x["slowest"] else "",
+                place_text(x["place"]),
             ]
             for x in sorted(listed, key=lambda x: -x["worst"] / x["allowed"])[:LISTED]
         ]  # fmt: skip

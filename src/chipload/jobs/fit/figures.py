@@ -91,11 +91,11 @@ def sections(done: FitResult, figures: dict[str, go.Figure]) -> list[str]:
 
 
 def _text_of(value: float, otherwise: str = "not known") -> str:
-    return f"{value:.4g}" if math.isfinite(value) else otherwise
+    return number_text(value) if math.isfinite(value) else otherwise
 
 
 def _span(interval: Floats) -> str:
-    return f"{interval[0]:.4g} to {interval[1]:.4g}" if np.isfinite(interval).all() else ""
+    return f"{number_text(interval[0])} to {number_text(interval[1])}" if np.isfinite(interval).all() else ""
 
 
 def _errors(done: FitResult) -> str:
@@ -109,10 +109,10 @@ def _errors(done: FitResult) -> str:
                 feed,
                 c.use,
                 CHANNELS[k],
-                f"{c.forces.mean[k]:.4g}",
+                number_text(c.forces.mean[k]),
                 f"{_text_of(c.predicted.mean[k])} &plusmn; {_text_of(c.predicted.half[0, k], '?')}",
                 _text_of(c.mean_percent[k]),
-                f"{c.forces.low[k]:.4g} to {c.forces.high[k]:.4g}",
+                f"{number_text(c.forces.low[k])} to {number_text(c.forces.high[k])}",
                 f"{_text_of(c.predicted.low[k])} to {_text_of(c.predicted.high[k])}",
                 _text_of(c.peak_percent[k]),
             ]

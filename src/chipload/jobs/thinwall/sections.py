@@ -30,7 +30,7 @@ def _operation_sentence(walled: ThinWallResult, number: int) -> str:
     leaves = f"; {own.leave:g} mm stay for the next cutter" if own.leave else ""
     return (
         f"Cutter {c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; {rows} "
-        f"{own.step_over:.4g} mm apart, {own.feed_per_tooth:.4g} mm a tooth{leaves}."
+        f"{number_text(own.step_over)} mm apart, {number_text(own.feed_per_tooth)} mm a tooth{leaves}."
     )
 
 
@@ -41,7 +41,8 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
     length, height, thickness = geometry.shape.size()
     body = [
         f"<h2>Operation 0: {escape(geometry.shape.name)}</h2>",
-        f"<p>{length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm thick when finished, "
+        f"<p>{number_text(length)} mm long, {number_text(height)} mm high, at least {number_text(thickness)} mm thick "
+        "when finished, "
         f"{'in the clamps of the part' if isinstance(geometry.shape, PartShape) else 'clamped at z = 0'}; "
         f"{' and '.join(f'{a:g}' for a in geometry.allowance)} mm of stock on its sides. "
         f"{' '.join(_operation_sentence(walled, k) for k in range(len(planning.operations)))}</p>",
@@ -118,13 +119,13 @@ def _variants(walled: ThinWallResult) -> str:
                 f'<span class="dot" style="background:{COLOURS[name]}"></span>{name}'
                 + (" <b>in use</b>" if name == USED else ""),
                 str(len(one.plan.maps)),
-                f"{one.seconds / 60.0:.4g}",
-                f"{1000.0 * one.deflection:.4g}",
-                f"{1000.0 * one.error:.4g}",
-                f"{1000.0 * one.error_rms:.4g}",
-                f"{one.force:.4g}",
+                number_text(one.seconds / 60.0),
+                number_text(1000.0 * one.deflection),
+                number_text(1000.0 * one.error),
+                number_text(1000.0 * one.error_rms),
+                number_text(one.force),
                 f"{one.columns['force_over_allowable'].max(initial=0.0):.3f}",
-                f"{one.stress:.4g}",
+                number_text(one.stress),
                 status,
                 f"<code>{program_name(0, name)}</code>",
             ]
@@ -176,10 +177,10 @@ def _infeasible(one: Variant) -> list[str]:
         [
             f"{h.side + 1}",
             ", ".join(f"{x:.2f}" for x in h.at),
-            f"{h.force_allowable_n:.4g}",
-            f"{h.force_n:.4g}",
-            "" if h.feed_per_tooth_mm is None else f"{h.feed_per_tooth_mm:.4g}",
-            "" if h.diameter_mm is None else f"{h.diameter_mm:.4g}",
+            number_text(h.force_allowable_n),
+            number_text(h.force_n),
+            "" if h.feed_per_tooth_mm is None else number_text(h.feed_per_tooth_mm),
+            "" if h.diameter_mm is None else number_text(h.diameter_mm),
             escape(remedy_text(h)),
         ]
         for h in sorted(one.plan.infeasible, key=lambda h: h.force_allowable_n)[:LISTED]
@@ -210,8 +211,8 @@ def _overload_section(walled: ThinWallResult) -> list[str]:
                 str(int(c["line"][k])),
                 ", ".join(f"{c[f'contact_{x}_mm'][k]:.2f}" for x in "xyz"),
                 f"{c['depth_mm'][k]:.3f}",
-                f"{c['force_normal_n'][k]:.4g}",
-                f"{c['force_allowable_n'][k]:.4g}",
+                number_text(c["force_normal_n"][k]),
+                number_text(c["force_allowable_n"][k]),
                 f"{c['force_over_allowable'][k]:.3f}",
             ]
             for k in one.over[: LISTED if name == USED else 5]

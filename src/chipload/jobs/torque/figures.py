@@ -104,13 +104,13 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
         body.append(
             f"<p>The torque limit is <b>{number_text(what['torque_limit_nm'])} N m</b>, mean over a "
             "revolution. It comes from "
-            f"{why}, at ({place}) mm, where the wall of {outcome.wall.thinnest:.4g} mm (the least that the tolerance "
-            f"allows) and the cutter allow {number_text(where['force_n'])} N along the normal. Elsewhere "
-            "the wall allows up to "
+            f"{why}, at ({place}) mm, where the wall of {number_text(outcome.wall.thinnest)} mm (the "
+            f"least that the tolerance allows) and the cutter allow {number_text(where['force_n'])} N along the "
+            "normal. Elsewhere the wall allows up to "
             f"{number_text(where['relief_max'], 3)} times as much torque. The set point of the controller "
             "is the same share of the "
             f"allowable torque everywhere, {number_text(where['held_nm'])} N m here. The real wall of "
-            f"{outcome.wall.real:.4g} "
+            f"{number_text(outcome.wall.real)} "
             f"mm would allow {number_text(where['true_wall_nm'])} N m. The closed formula for one tooth, "
             "which neglects the "
             f"engagement, gives {number_text(where['one_tooth_formula_nm'], 3)} N m.</p>"
@@ -195,7 +195,7 @@ def _table(outcome: TorqueResult, case: ControllerCase) -> str:
             f'<span class="dot" style="background:{drawn.COLOURS[name]}"></span>{drawn.NAMES[name]}',
             f"{n['time_s']:.2f}",
             cell(100.0 * n["torque_nm_max"] / torque_nm, 100.0 * most / torque_nm),
-            f"{n['torque_raw_nm_max']:.4g}",
+            number_text(n['torque_raw_nm_max']),
             f"{n['torque_over_limit_s']:.3f}",
             cell(n["form_error_um_max"], outcome.job.limits["form_error_um"], ".3g"),
             cell(n["stress_mpa_max"], outcome.job.limits["strength_share"] * outcome.wall.strength, ".3g"),
@@ -232,7 +232,12 @@ def _workpiece(wall: ClampedWorkpiece, figures: dict[str, go.Figure]) -> list[st
 def _wall(wall: ShellWall, outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     solid, whole = wall.solid, float(wall.oval.share.sum())
     rows = [
-        [f"{p.s:.4g}", f"{1e3 * p.shell:.4g}", f"{1e3 * p.solid:.4g}", f"{100.0 * (p.solid / p.shell - 1.0):+.2f}"]
+        [
+            number_text(p.s),
+            number_text(1e3 * p.shell),
+            number_text(1e3 * p.solid),
+            f"{100.0 * (p.solid / p.shell - 1.0):+.2f}",
+        ]
         for p in solid.places
     ]
     a, b, c = solid.counts
@@ -246,7 +251,7 @@ def _wall(wall: ShellWall, outcome: TorqueResult, figures: dict[str, go.Figure])
     )
     return [
         "<h2>Compliance of the wall</h2>",
-        f"<p>A force of 1 N at the free end deflects the wall of {wall.thinnest:.4g} mm by "
+        f"<p>A force of 1 N at the free end deflects the wall of {number_text(wall.thinnest)} mm by "
         f"{number_text(1e3 * whole)} µm, "
         f"nearly all of it because the section becomes oval. {beam}</p>",
         figure("oval", drawn.ovalisation_figure(wall), figures),

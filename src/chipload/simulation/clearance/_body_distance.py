@@ -108,7 +108,7 @@ def nearest(
                     c = (i * ny + j) * nz + h
                     begin, end = starts[c], starts[c + 1]
                     if end - begin >= FEWEST:
-                        x, y, z = low[0] + (i + 0.5) * cell - tx, low[1] + (j + 0.5) * cell - ty, 0.0
+                        x, y = low[0] + (i + 0.5) * cell - tx, low[1] + (j + 0.5) * cell - ty
                         z = low[2] + (h + 0.5) * cell - tz
                         up = x * ax + y * ay + z * az
                         if up < -far - ball or up > top + far + ball:
