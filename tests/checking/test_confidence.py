@@ -42,7 +42,7 @@ def free() -> LimitCheck:
 
 
 def test_the_text_states_the_nominal_value_and_what_the_error_adds(free: LimitCheck) -> None:
-    assert free.text == f"force {free.worst:.4g} + {free.value_at_confidence - free.worst:.2g} of 10000 N"
+    assert free.text == f"force {free.worst:.3g} + {free.value_at_confidence - free.worst:.2g} of 10000 N"
     names = [p.name for p, _ in free.budget.in_order()]
     assert set(names) == {"coefficients", "runout that is not stated", "resolution and chip", "turns"}
     assert names[-1] == "turns" or names[-2] == "turns"
@@ -88,7 +88,7 @@ def test_at_50_percent_the_nominal_value_counts_and_the_one_at_95_is_shown(free:
     check = force(plain)
     assert check.state is Verdict.HOLDS
     assert check.value_at_confidence == pytest.approx(free.value_at_confidence)
-    assert check.text == f"force {check.worst:.4g} of {check.limit:.6g} N"
+    assert check.text == f"force {check.worst:.3g} of {check.limit:.6g} N"
     assert plain.first_lines[-1].startswith(f"At 95 %: force {check.value_at_confidence:.3g} N (coefficients ")
     table = "".join(limits_table(plain.tracks))
     assert "at 95 %" in table

@@ -158,7 +158,7 @@ def simulate_program(
         removal = remove(
             program, stock, cutters, material, fine, watch=watch_all, times=times,
             loads=inputs.loads, outlines=inputs.outlines, workers=threads_of(workers), seen=partial.take,
-            uncounted=reading.uncounted if isinstance(reading, ProgramSequence) else 0, progress=removing,
+            uncounted=reading.uncounted if isinstance(reading, ProgramSequence) else -1, progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)

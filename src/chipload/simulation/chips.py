@@ -84,7 +84,7 @@ def remove(
     workers: int = 2,
     loads: bool = True,
     outlines: bool = True,
-    uncounted: int = 0,
+    uncounted: int = -1,
     seen: Seen = unseen,
     progress: Progress = silent,
 ) -> Removal:
@@ -108,7 +108,7 @@ def remove(
     outlines : False: of what is left only the volume is needed: ``stock`` stays as it was, and its volume afterwards is
         that before less the chips
     uncounted : last line whose steps only make room for those after it: what they remove is not calculated, and their
-        columns and chips are 0
+        columns and chips are 0; -1: none
     seen : takes the columns of each block of steps as soon as they are known
 
     Returns

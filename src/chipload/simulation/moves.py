@@ -123,7 +123,7 @@ class MoveRun:
     bodies : numbers of tools that are bodies without chips
     earlier : moves that cut the body before the run; they are in ``stock``
     shank : is asked where material stands above the flutes; None: a run that meets some ends
-    uncounted : last line whose steps are made without calculating what they remove
+    uncounted : last line whose steps are made without calculating what they remove; -1: none
     """
 
     stock: MoveStock | BrickStock
@@ -134,7 +134,7 @@ class MoveRun:
     bodies: tuple[int, ...] = ()
     earlier: EarlierMoves | None = None
     shank: ShankContact | None = None
-    uncounted: int = 0
+    uncounted: int = -1
 
     @property
     def upright(self) -> bool:

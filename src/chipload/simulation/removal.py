@@ -173,7 +173,7 @@ class RunSettings:
     moves: MoveRun | None = None
     loads: bool = True
     other: Material | None = None
-    uncounted: int = 0
+    uncounted: int = -1
 
     @property
     def run(self) -> MoveRun:
