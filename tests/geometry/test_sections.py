@@ -58,6 +58,16 @@ def test_a_section_may_begin_at_the_other_edge():
     np.testing.assert_allclose(made.minus.at(u, v), same.minus.at(u, v), atol=0.05)
 
 
+def test_a_section_across_the_axis_may_begin_at_the_other_edge():
+    """Which edge leads is not told by its height: the second of three sections runs as the others."""
+    t = np.linspace(0.0, 2.0 * np.pi, 81)[:-1]
+    flat = [np.stack([50.0 + 10.0 * np.cos(t), 1.5 * np.sin(t), np.full(80, z)], axis=-1) for z in (40.0, 50.0, 60.0)]
+    made, same = loft((flat[0], np.roll(flat[1], 40, axis=0), flat[2])), loft(tuple(flat))
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.0, 1.0, 19), np.linspace(0.0, 1.0, 9), indexing="ij"))
+    np.testing.assert_allclose(made.plus.at(u, v), same.plus.at(u, v), atol=1e-3)
+    np.testing.assert_allclose(made.minus.at(u, v), same.minus.at(u, v), atol=1e-3)
+
+
 def test_units_and_columns(tmp_path):
     p = section(10.0)
     r, theta = np.hypot(p[:, 0], p[:, 1]), np.arctan2(p[:, 1], p[:, 0])

@@ -194,7 +194,10 @@ def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
     halves = [_halves(p) for p in sections]
     both = [[_read(half[k], u) for k in range(2)] for half in halves]
     for before, pair in itertools.pairwise(both):
-        # a section may begin at either edge: its sides are those that face as the sides of the one before
+        # a section may begin at either edge: it runs, and its sides face, as those of the one before
+        chord, own = (x[0] + x[1] - x[0][::-1] - x[1][::-1] for x in (before, pair))
+        if float((chord * own).sum()) < 0.0:
+            pair[:] = [side[::-1] for side in pair]
         if float(((before[0] - before[1]) * (pair[0] - pair[1])).sum()) < 0.0:
             pair.reverse()
     sides = [np.array([pair[k] for pair in both]) for k in range(2)]
