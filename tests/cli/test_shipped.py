@@ -135,7 +135,7 @@ def test_a_coarse_run_says_so(tmp_path: Path) -> None:
     asked = coarser(load_job(job))
     assert asked == (
         "operation.0.step_mm=4", "operation.0.tolerance_mm=0.02", "stock.chord_mm=0.05", "stock.layer_mm=1.2",
-        "operation.0.corner_slices=8", "operation.0.resolution_error=false",
+        "operation.0.corner_slices=8", "operation.0.join_mm=0.12", "operation.0.resolution_error=false",
     )  # fmt: skip
     call("run", job, "--out", tmp_path / "fine")
     code, said, _ = call("run", job, "--coarse", "--out", tmp_path / "coarse")
