@@ -445,12 +445,9 @@ def values_of(name: str, folder: Path) -> Text:
 
 
 def fingerprint(folder: Path, picture: str) -> str:
-    """Return a digest of what a picture of a result shows: numbers to four digits, of the page the first line too,
-    without the line and the place of its value.
-    """
+    """Return a digest of what a picture of a result shows: numbers to four digits, of the page the first line too."""
     summary = Run(folder).summary
-    message = re.sub(r",? in line \d+ at \([^)]*\)", "", summary["message"])
-    shown = [summary["verdict"], message if picture.startswith("page") else ""]
+    shown = [summary["verdict"], summary["message"] if picture.startswith("page") else ""]
     for track in summary["tracks"]:
         numbers = [track["time_s"], track["rows"], *(check["worst"] for check in track["limits"])]
         shown += [track["name"], *(None if x is None else f"{x:.4g}" for x in numbers)]

@@ -220,8 +220,7 @@ def test_one_clock(example, name):
         if track.time_s is None:
             continue
         if shown is None:
-            minutes = float(re.search(r" ([0-9.e+-]+) min; ", report)[1])
-            assert 60.0 * minutes == pytest.approx(track.time_s, rel=CLOSE)
+            assert f" {number_text(track.time_s / 60.0)} min; " in report
         else:
             most = "" if track.time_high_s is None else f" to {number_text(track.time_high_s)}"
             assert f"{number_text(track.time_s)}{most}" in shown
@@ -235,7 +234,8 @@ def test_one_clock(example, name):
             close = 2e-3 if name in ("impeller", "frame") else CLOSE
             assert line_times(read, machine)[1].sum() == pytest.approx(track.time_s, rel=close), track.name
             if track.in_use:
-                assert 60.0 * minutes_of(done, track.programs[0]) == pytest.approx(track.time_s, rel=close)
+                # in three digits
+                assert 60.0 * minutes_of(done, track.programs[0]) == pytest.approx(track.time_s, rel=close + 5e-3)
     for operation in done.summary.operations if done.result.capability not in OVERRIDDEN else ():
         if "program" in operation:
             assert operation["program"]["time_s"] == pytest.approx(done.result.tracks[0].time_s, rel=CLOSE)
