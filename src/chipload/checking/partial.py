@@ -26,7 +26,7 @@ class PartialLimits:
     >>> partial = PartialLimits({"force_n": 550.0, "torque_nm": 2.8})
     >>> partial.take({"force_n": np.array([120.0, 412.4]), "torque_nm": np.array([1.0, 2.0]), "line": np.array([7, 9])})
     >>> partial.text()
-    'so far force 412.4 of 550 N in line 9, torque 2 of 2.8 N m in line 9'
+    'so far force 412 of 550 N in line 9, torque 2 of 2.8 N m in line 9'
     """
 
     def __init__(self, limits: Mapping[str, float]) -> None:

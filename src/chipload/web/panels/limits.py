@@ -80,7 +80,7 @@ def time_line(times: Times | None) -> str:
     """The time of a program and its parts, which add up to it, as HTML; empty: it is not known.
 
     >>> time_line(Times(60.0, 6.5, 3.25, 0.0, 2.0))[21:]
-    'Time 71.75 s: in cut 60, in air 6.5, rapids 3.25, dwell 0, tool change, start-up and approach 2 s</div>'
+    'Time 71.8 s: in cut 60, in air 6.5, rapids 3.25, dwell 0, tool change, start-up and approach 2 s</div>'
     """
     if times is None:
         return ""
