@@ -130,6 +130,11 @@ def read_regular(path: str | Path, label: str, most: int, remedy: str = "split i
         return data
 
 
+def is_utf16(data: bytes) -> bool:
+    """Whether a text begins with a byte order mark of UTF-16."""
+    return data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+
+
 def decode_text(data: bytes) -> str:
     """The text of a file that others wrote: UTF-16 where a byte order mark says so, else UTF-8, else Latin-1.
 
@@ -138,7 +143,7 @@ def decode_text(data: bytes) -> str:
     >>> [decode_text("Ø10".encode(kind)) for kind in ("utf-8", "utf-8-sig", "utf-16", "latin-1")]
     ['Ø10', 'Ø10', 'Ø10', 'Ø10']
     """
-    if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+    if is_utf16(data):
         return data.decode("utf-16", "replace")
     try:
         return data.decode("utf-8-sig")

@@ -34,6 +34,18 @@ def test_text_behind_a_semicolon_is_a_comment():
     assert read("G1 X10. F100. ; finish pass 3\n; T1 D10. L50.")[1] == []
 
 
+def test_what_stands_before_a_semicolon_is_never_dropped():
+    """A jump that is made, one that is not, and words that nobody reads, each before a block."""
+    line = "IF [#1 EQ %d] GOTO 7 ; G1 X50. F100.\nG1 Z5. F100.\nN7 G1 Y5. F100."
+    made, findings = read("#1=1\n" + line % 1)
+    assert ends(made)[-1].tolist() == [0, 5, 10]
+    assert codes(findings) == ["nc-end-of-block", "nc-end-of-block"]
+    not_made, findings = read("#1=1\n" + line % 2)
+    assert ends(not_made)[-3:].tolist() == [[50, 0, 10], [50, 0, 5], [50, 5, 5]]
+    assert codes(findings) == ["nc-end-of-block"]
+    assert "nc-not-read" in codes(read("HELLO X=; G1 X50. F100.")[1])
+
+
 def test_blocks_behind_a_call_on_one_line_are_a_finding():
     commands, findings = read("M98 P5; G1 X50. F100.\nM30\nO5\nG1 Y5. F100.\nM99")
     assert ends(commands)[-1].tolist() == [0, 5, 10]

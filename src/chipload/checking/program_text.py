@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from chipload.checking.outcome import ChangedText
 from chipload.errors import InputError
-from chipload.files import decode_text, read_regular
+from chipload.files import decode_text, is_utf16, read_regular
 from chipload.machine.machine import Machine
 from chipload.program import heidenhain
 from chipload.program.control import control_named, is_cl_data
@@ -49,9 +48,8 @@ def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> t
             "convert it first (chipload convert)"
         )
     data = read_regular(path, path.name, LARGEST_FILE)
-    wide = data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     # bytes that are no UTF-8 are written as they were
-    text = decode_text(data) if wide else data.decode("utf-8", "surrogateescape")
+    text = decode_text(data) if is_utf16(data) else data.decode("utf-8", "surrogateescape")
     lone = text.replace("\r\n", "\n").find("\r")
     if lone >= 0:
         raise InputError(f"{path.name}: a line ends with CR alone: write LF or CR LF to change its {words}")

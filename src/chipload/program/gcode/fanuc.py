@@ -156,15 +156,14 @@ class Fanuc(Dialect):
         if ";" not in raw:
             return [raw]
         parts = _COMMENT.sub(lambda found: found[0].replace(";", ","), raw).split(";")
-        blocks = [part for part in parts if _BLOCK.fullmatch("".join(_COMMENT.sub("", part).split()))]
-        behind = next((part for part in parts[1:] if part in blocks), None)
-        if behind is None:
+        behind = [part for part in parts[1:] if _BLOCK.fullmatch("".join(_COMMENT.sub("", part).split()))]
+        if not behind:
             return [raw]
         c.leave_out(
             "nc-end-of-block",
-            f"{behind.strip()[:60]!r}: stands behind ; and is carried out as a block: put a comment in ( )",
+            f"{behind[0].strip()[:60]!r}: stands behind ; and is carried out as a block: put a comment in ( )",
         )
-        return blocks
+        return [parts[0], *behind]
 
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line, in LinuxCNC's words."""
